@@ -1,0 +1,72 @@
+/// The yardstick: exact membership in the space that the frames themselves have seen, and what it says of a map.
+/// Independent of the mapper: it needs only the frames and a cloud of surfels, anybody's.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels::scoring {
+
+/// Shares between 0 and 1; see the README for each.
+struct ExactScore {
+  // Per surfel. right + buried + floating + flipped = 1.
+  double right = 0;     ///< not known(p - r/4 n) and known(p + 7/4 r n)
+  double buried = 0;    ///< both known
+  double floating = 0;  ///< neither known
+  double flipped = 0;   ///< only the back one known
+  double within_1v = 0, within_2v = 0;  ///< next unknown -> known step along +n at most 1, 2 voxels (r / 0.866) away
+  double fdr_2cm = 0, fdr_5cm = 0;      ///< the same further away than 2, 5 cm
+  // Per point of the exact boundary.
+  double miss_1cm = 0, miss_2cm = 0, miss_5cm = 0;  ///< no surfel centre within that distance
+  double label_ok = 0;                              ///< of those with a surfel within 2 cm: the nearest one's label is right
+  std::size_t boundary_points = 0;
+};
+
+/// What is wrong with one surfel, for pictures.
+enum class Verdict : std::uint8_t { kRight, kBuried, kFloating, kFlipped };
+
+/// A point of the exact boundary, found by marching from known to not known.
+struct BoundaryPoint {
+  Eigen::Vector3d position;  ///< world [m]
+  bool occupied = false;     ///< 3 mm further on a frame sees it at most 3 cm behind its measured surface
+};
+
+class ExactTest {
+ public:
+  /// @param z_min, z_max  depths outside are no measurements [m]
+  /// @param decimation    every so many pixels of the images are used, as by the mapper
+  ExactTest(double z_min, double z_max, int decimation);
+
+  /// Adds a frame; what it needs of the images is copied.
+  void add(const DepthFrame& frame);
+  std::size_t size() const { return views_.size(); }
+
+  /// known(p) <=> there is a frame m and its pixel q = round(pi(T_m^-1 p)) inside the image with a valid depth d,
+  /// z_min <= d <= z_max, and 0 < z(T_m^-1 p) < d.
+  bool known(const Eigen::Vector3d& p_world) const;
+
+  /// `segments` random rays: a random frame and valid pixel, a point at 2-98 % of its depth, a random direction; marched in 1 cm steps until not
+  /// known (at most 2 z_max), bisected; dropped if any of the next four 5 mm steps is known again. The same seed gives the same points.
+  std::vector<BoundaryPoint> boundary(std::size_t segments, std::uint64_t seed) const;
+
+  /// The whole test. `progress` is called now and then with a share between 0 and 1; if it returns false, Error is thrown.
+  /// @param verdicts  if not null: one per surfel
+  ExactScore score(const std::vector<Surfel>& surfels, std::size_t segments = 40000, int threads = 0,
+                   const std::function<bool(double)>& progress = {}, std::vector<Verdict>* verdicts = nullptr) const;
+
+ private:
+  struct View {
+    double fx, fy, cx, cy;
+    int width, height;
+    Eigen::Isometry3d T_camera_world;
+    std::vector<float> depth;  ///< depth[height][width] [m]; 0: no measurement
+  };
+  double z_min_, z_max_;
+  int decimation_;
+  std::vector<View> views_;
+};
+
+}  // namespace frontier_surfels::scoring

@@ -1,0 +1,42 @@
+/// The paper's own yardstick (4.1.2, 4.2.1): an OctoMap built from the same frames, and its boundary surfels M.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels::scoring {
+
+/// Comparison of a cloud Psi with OctoMap's M at a distance tolerance (5 cm in the paper).
+struct OctomapScore {
+  std::size_t surfels = 0;  ///< |M|
+  std::size_t fp = 0;       ///< of Psi, further than the tolerance from every M
+  std::size_t fn = 0;       ///< of M, further than the tolerance from every Psi
+  double fdr = 0;           ///< fp / |Psi|
+  double for_ = 0;          ///< fn / |M|
+};
+
+class OctomapTruth {
+ public:
+  /// @param resolution  side of a voxel [m];  z_min, z_max: depths outside are no measurements;  decimation: as by the mapper
+  OctomapTruth(double resolution, double z_min, double z_max, int decimation);
+  ~OctomapTruth();
+
+  /// Inserts a frame's points with insertPointCloud. @return its wall time [ms], without the making of the point cloud
+  double add(const DepthFrame& frame);
+
+  /// M: unknown voxels that are 6-neighbours of known (free or occupied) ones - eq. (17)-(18): one surfel at the centre of each. Normal: the normalised sum of
+  /// unit vectors to the known voxels among the 26 neighbours; radius sqrt(3)/2 resolution; label occupied when a 6-neighbour is occupied in OctoMap, else frontier.
+  std::vector<Surfel> boundary() const;
+
+  OctomapScore score(const std::vector<Surfel>& psi, const std::vector<Surfel>& m, double tolerance = 0.05) const;
+
+  double memory_mb() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace frontier_surfels::scoring
