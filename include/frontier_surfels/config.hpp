@@ -1,7 +1,6 @@
 /// Every parameter of the method: the only place with defaults, units, meanings and ranges.
 #pragma once
 
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -9,7 +8,7 @@ namespace frontier_surfels {
 
 struct Config {
   // Device
-  std::string platform;              // part of its name
+  std::string platform;  // part of its name
   std::string device_type = "any";
   int device_index = 0;
   int threads = 0;
@@ -36,6 +35,7 @@ struct Config {
   int recent_views = 10;
   double recent_view_distance = 0.02;
   double recent_view_angle = 2.0;
+  bool remove_buried = true;
 
   /// Every fault, one sentence each; empty when the configuration can be used.
   std::vector<std::string> problems() const;
@@ -54,15 +54,12 @@ struct FieldInfo {
 /// YAML files, --set, the parameter table and ROS parameters all go through this list.
 template <typename ConfigT, typename Visitor>
 void for_each_field(ConfigT& config, Visitor&& visit) {
-  constexpr double kMany = std::numeric_limits<int>::max();
-  visit(FieldInfo{"platform", "", "OpenCL platform: part of its name, any case; empty: the first with a fitting device"},
-        config.platform);
+  visit(FieldInfo{"platform", "", "OpenCL platform: part of its name, any case; empty: the first with a fitting device"}, config.platform);
   visit(FieldInfo{"device_type", "", "any, cpu, gpu or accelerator"}, config.device_type);
   visit(FieldInfo{"device_index", "", "which of the fitting devices", 0, 255}, config.device_index);
   visit(FieldInfo{"threads", "", "compute units to use, where the device can be divided; 0: all", 0, 4096}, config.threads);
 
-  visit(FieldInfo{"decimation", "pixel", "every so many pixels of the depth image are used, in both directions", 1, 64},
-        config.decimation);
+  visit(FieldInfo{"decimation", "pixel", "every so many pixels of the depth image are used, in both directions", 1, 64}, config.decimation);
   visit(FieldInfo{"z_min", "m", "depth below which the grid is a cuboid; nearer measurements are ignored", 0.01, 100}, config.z_min);
   visit(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
   visit(FieldInfo{"padding_i", "voxel", "grid beyond the image, left and right", 1, 64}, config.padding_i);
@@ -72,8 +69,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"carve_no_return", "", "a depth of +Inf observes free space up to z_max"}, config.carve_no_return);
   visit(FieldInfo{"carve_beyond_range", "", "a depth beyond z_max observes free space up to z_max"}, config.carve_beyond_range);
 
-  visit(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger", 0, 0.99},
-        config.th_d);
+  visit(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger", 0, 0.99}, config.th_d);
   visit(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);
   visit(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
   visit(FieldInfo{"median_votes", "voxel", "known voxels among 27 that make the middle one known", 1, 27}, config.median_votes);
@@ -83,13 +79,15 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"recent_view_distance", "m", "a view is kept if the camera is so far from every kept one, or ...", 0, 100},
         config.recent_view_distance);
   visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
-  (void)kMany;
+  visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
 }
 
-/// Reads a flat YAML map of fields over the defaults. @throws Error naming file, line and field for what is unknown or malformed
+/// Reads a flat YAML map of fields over the defaults. Values out of range are left to problems().
+/// @throws FileError  the file cannot be read
+/// @throws Error      every unknown, repeated or malformed entry, with file and line
 Config load_config(const std::string& path);
 
-/// Sets one field from text, as --set key=value does. @throws Error
+/// Sets one field from text, as --set key=value does. @throws Error  no such field (with the nearest name), or not of its type
 void set_field(Config& config, const std::string& name, const std::string& value);
 
 /// The configuration as YAML that load_config reads back.

@@ -1,4 +1,5 @@
-/// Surfels as PLY files: binary little endian, vertex properties x y z nx ny nz radius (float), red green blue label (uchar; 1 occupied, 0 frontier).
+/// Surfels as PLY files: binary little endian, vertex properties x y z nx ny nz radius (float), red green blue label (uchar; 1 occupied, 0
+/// frontier).
 #pragma once
 
 #include <string>
@@ -8,7 +9,8 @@
 
 namespace frontier_surfels {
 
-/// Writes to `path`.tmp-* first, flushes it and renames it: an existing file is replaced whole or not at all. A checksum goes into a header comment.
+/// Writes to `path`.tmp-* first, flushes it and renames it: an existing file is replaced whole or not at all. A checksum goes into a header
+/// comment.
 /// @throws FileError
 void write_ply(const std::string& path, const std::vector<Surfel>& surfels);
 

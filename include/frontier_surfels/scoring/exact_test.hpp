@@ -13,10 +13,10 @@ namespace frontier_surfels::scoring {
 /// Shares between 0 and 1; see the README for each.
 struct ExactScore {
   // Per surfel. right + buried + floating + flipped = 1.
-  double right = 0;     ///< not known(p - r/4 n) and known(p + 7/4 r n)
-  double buried = 0;    ///< both known
-  double floating = 0;  ///< neither known
-  double flipped = 0;   ///< only the back one known
+  double right = 0;                     ///< not known(p - r/4 n) and known(p + 7/4 r n)
+  double buried = 0;                    ///< both known
+  double floating = 0;                  ///< neither known
+  double flipped = 0;                   ///< only the back one known
   double within_1v = 0, within_2v = 0;  ///< next unknown -> known step along +n at most 1, 2 voxels (r / 0.866) away
   double fdr_2cm = 0, fdr_5cm = 0;      ///< the same further away than 2, 5 cm
   // Per point of the exact boundary.
@@ -34,39 +34,46 @@ struct BoundaryPoint {
   bool occupied = false;     ///< 3 mm further on a frame sees it at most 3 cm behind its measured surface
 };
 
+class ExactView;  // what one frame has seen; private
+
 class ExactTest {
  public:
+  /// score() uses boundary(segments, kSeed), so that the scores of two maps can be compared.
+  static constexpr std::uint64_t kSeed = 1;
+
   /// @param z_min, z_max  depths outside are no measurements [m]
   /// @param decimation    every so many pixels of the images are used, as by the mapper
   ExactTest(double z_min, double z_max, int decimation);
+  ~ExactTest();
+  ExactTest(ExactTest&&) noexcept;
+  ExactTest& operator=(ExactTest&&) noexcept;
 
   /// Adds a frame; what it needs of the images is copied.
+  /// @throws BadFrame if it has no image, camera or pose
   void add(const DepthFrame& frame);
-  std::size_t size() const { return views_.size(); }
+  std::size_t size() const;
 
   /// known(p) <=> there is a frame m and its pixel q = round(pi(T_m^-1 p)) inside the image with a valid depth d,
   /// z_min <= d <= z_max, and 0 < z(T_m^-1 p) < d.
   bool known(const Eigen::Vector3d& p_world) const;
 
-  /// `segments` random rays: a random frame and valid pixel, a point at 2-98 % of its depth, a random direction; marched in 1 cm steps until not
-  /// known (at most 2 z_max), bisected; dropped if any of the next four 5 mm steps is known again. The same seed gives the same points.
-  std::vector<BoundaryPoint> boundary(std::size_t segments, std::uint64_t seed) const;
+  /// `segments` random rays: a random frame and valid pixel, a point at 2-98 % of its depth, a random direction; marched in 1 cm steps
+  /// until not known (at most 2 z_max), bisected; dropped if any of the next four 5 mm steps is known again. The same seed gives the same
+  /// points.
+  /// @param threads  0: as many as the machine has; the points do not depend on it
+  std::vector<BoundaryPoint> boundary(std::size_t segments, std::uint64_t seed, int threads = 0) const;
 
-  /// The whole test. `progress` is called now and then with a share between 0 and 1; if it returns false, Error is thrown.
+  /// The whole test. A surfel that is not finite counts as floating; where there is nothing to share out, shares are 0, but without any
+  /// surfel all of the boundary is missed.
+  /// @param progress  called now and then, on the calling thread, with a share between 0 and 1; if it returns false, Error is thrown
   /// @param verdicts  if not null: one per surfel
   ExactScore score(const std::vector<Surfel>& surfels, std::size_t segments = 40000, int threads = 0,
                    const std::function<bool(double)>& progress = {}, std::vector<Verdict>* verdicts = nullptr) const;
 
  private:
-  struct View {
-    double fx, fy, cx, cy;
-    int width, height;
-    Eigen::Isometry3d T_camera_world;
-    std::vector<float> depth;  ///< depth[height][width] [m]; 0: no measurement
-  };
   double z_min_, z_max_;
   int decimation_;
-  std::vector<View> views_;
+  std::vector<ExactView> views_;
 };
 
 }  // namespace frontier_surfels::scoring

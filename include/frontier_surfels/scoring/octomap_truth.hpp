@@ -26,8 +26,9 @@ class OctomapTruth {
   /// Inserts a frame's points with insertPointCloud. @return its wall time [ms], without the making of the point cloud
   double add(const DepthFrame& frame);
 
-  /// M: unknown voxels that are 6-neighbours of known (free or occupied) ones - eq. (17)-(18): one surfel at the centre of each. Normal: the normalised sum of
-  /// unit vectors to the known voxels among the 26 neighbours; radius sqrt(3)/2 resolution; label occupied when a 6-neighbour is occupied in OctoMap, else frontier.
+  /// M: unknown voxels that are 6-neighbours of known (free or occupied) ones - eq. (17)-(18): one surfel at the centre of each. Normal:
+  /// the normalised sum of unit vectors to the known voxels among the 26 neighbours; radius sqrt(3)/2 resolution; label occupied when a
+  /// 6-neighbour is occupied in OctoMap, else frontier.
   std::vector<Surfel> boundary() const;
 
   OctomapScore score(const std::vector<Surfel>& psi, const std::vector<Surfel>& m, double tolerance = 0.05) const;

@@ -1,0 +1,34 @@
+# Libraries, headers, programs and data; find_package(frontier_surfels) with and without ROS.
+
+# Programs and libraries find each other wherever the prefix is moved to.
+file(RELATIVE_PATH to_libraries /${INSTALL_PROGRAMS_TO} /${INSTALL_LIBRARIES_TO})
+set_target_properties(${PROGRAMS} PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
+set_target_properties(frontier_surfels frontier_surfels_scoring PROPERTIES INSTALL_RPATH "$ORIGIN")
+
+install(TARGETS frontier_surfels frontier_surfels_scoring EXPORT frontier_surfelsTargets
+  LIBRARY DESTINATION ${INSTALL_LIBRARIES_TO})
+install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
+install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO}
+  PATTERN replay EXCLUDE)  # belongs to the programs
+install(DIRECTORY config DESTINATION ${INSTALL_SHARE_TO})
+file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)
+install(PROGRAMS ${PYTHON_SCRIPTS} DESTINATION ${INSTALL_PROGRAMS_TO})  # beside the programs that run them
+
+# With catkin its own config file includes frontier_surfels-extras.cmake, which includes the targets; without, ours does.
+if(FRONTIER_SURFELS_WITH_ROS)
+  set(package_dir ${INSTALL_SHARE_TO}/cmake)
+  if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+    set(package_dir ${INSTALL_LIBRARIES_TO}/cmake/frontier_surfels)  # where catkin then puts its config file
+  endif()
+  export(EXPORT frontier_surfelsTargets NAMESPACE frontier_surfels::
+    FILE ${CATKIN_DEVEL_PREFIX}/share/frontier_surfels/cmake/frontier_surfelsTargets.cmake)
+else()
+  set(package_dir ${INSTALL_LIBRARIES_TO}/cmake/frontier_surfels)
+  include(CMakePackageConfigHelpers)
+  write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/frontier_surfelsConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+  configure_file(cmake/frontier_surfels-extras.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/frontier_surfelsConfig.cmake COPYONLY)
+  #catkin_lint: ignore_once missing_file
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/frontier_surfelsConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/frontier_surfelsConfigVersion.cmake
+    DESTINATION ${package_dir})
+endif()
+install(EXPORT frontier_surfelsTargets NAMESPACE frontier_surfels:: DESTINATION ${package_dir})

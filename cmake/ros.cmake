@@ -1,0 +1,51 @@
+# Finds ROS 1, if it is wanted and there. Sets FRONTIER_SURFELS_WITH_ROS and where things are installed (INSTALL_..._TO).
+
+set(FRONTIER_SURFELS_WITH_ROS OFF)
+if(FRONTIER_SURFELS_ROS)
+  # Debian's catkin and pluginlib need the system's Python; another one first on PATH lacks their modules.
+  foreach(variable PYTHON_EXECUTABLE Python3_EXECUTABLE)
+    if(NOT ${variable} AND EXISTS /usr/bin/python3)
+      set(${variable} /usr/bin/python3 CACHE FILEPATH "interpreter with the modules of ROS")
+    endif()
+  endforeach()
+  # catkin writes setup.bash and more to the prefix that was configured, whatever --prefix says: stop before that happens.
+  set(guard ${CMAKE_CURRENT_BINARY_DIR}/check_prefix.cmake)
+  file(WRITE ${guard} "")
+  install(CODE "include(\"${guard}\")")
+
+  find_package(catkin QUIET)
+  if(catkin_FOUND)
+    set(FRONTIER_SURFELS_WITH_ROS ON)
+  else()
+    message(STATUS "frontier_surfels: no catkin found, so built without ROS: no nodelet, no bags")
+  endif()
+else()
+  message(STATUS "frontier_surfels: built without ROS, as asked for: no nodelet, no bags")
+endif()
+
+if(FRONTIER_SURFELS_WITH_ROS)
+  if(CATKIN_INSTALL_INTO_PREFIX_ROOT)
+    file(WRITE ${guard} "
+if(NOT CMAKE_INSTALL_PREFIX STREQUAL \"${CMAKE_INSTALL_PREFIX}\")
+  message(FATAL_ERROR \"With ROS the prefix must be known when configuring: run cmake again with -DCMAKE_INSTALL_PREFIX=\${CMAKE_INSTALL_PREFIX}\")
+endif()
+")
+  endif()
+  find_package(catkin REQUIRED COMPONENTS cv_bridge rosbag_storage sensor_msgs tf2 tf2_msgs)
+  catkin_package(
+    INCLUDE_DIRS include
+    LIBRARIES frontier_surfels frontier_surfels_scoring
+    CFG_EXTRAS frontier_surfels-extras.cmake)
+  set(INSTALL_PROGRAMS_TO ${CATKIN_PACKAGE_BIN_DESTINATION})
+  set(INSTALL_LIBRARIES_TO ${CATKIN_PACKAGE_LIB_DESTINATION})
+  set(INSTALL_INCLUDES_TO ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
+  set(INSTALL_SHARE_TO ${CATKIN_PACKAGE_SHARE_DESTINATION})
+else()
+  # catkin's layout, but programs where every shell looks for them.
+  set(INSTALL_PROGRAMS_TO bin)
+  set(INSTALL_LIBRARIES_TO lib)
+  set(INSTALL_INCLUDES_TO include/frontier_surfels)
+  set(INSTALL_SHARE_TO share/frontier_surfels)
+  set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/bin)
+  set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/lib)
+endif()

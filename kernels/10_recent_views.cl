@@ -1,0 +1,45 @@
+// Recent views: our addition to the paper. A candidate whose centre a kept view has seen is known: no surfel there.
+
+// Are both ends of a segment outside the image, or behind it, on the same side? Then all of it is.
+bool segment_outside(const View* view, float3 a, float3 b) {
+  if (a.z <= 0.0f && b.z <= 0.0f) return true;
+  const float left = view->cx + 0.5f, right = (float)view->width - 0.5f - view->cx;
+  const float top = view->cy + 0.5f, bottom = (float)view->height - 0.5f - view->cy;
+  return (a.x * view->fx < -left * a.z && b.x * view->fx < -left * b.z) || (a.x * view->fx > right * a.z && b.x * view->fx > right * b.z) ||
+         (a.y * view->fy < -top * a.z && b.y * view->fy < -top * b.z) || (a.y * view->fy > bottom * a.z && b.y * view->fy > bottom * b.z);
+}
+
+// One work item a word. Its voxels' centres lie on one line a + z b, in the camera's frame and in every view's.
+//   in  views[view_count]: T_camera_world is from this frame's camera to the view's;  depths: their images;  layer_depth[size_k]
+//   i/o candidates: those that a view knows are cleared
+__kernel void settle_candidates(const Grid g, __global const View* views, const int view_count, __global const float* depths,
+                                __global const float* layer_depth, __global ulong* candidates) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  // A word may hold layers of both parts of the grid.
+  const ulong cuboid = bit_run(0, g.first_pyramid_layer - 64 * w);
+  for (int part = 0; part < 2; ++part) {
+    const bool pyramid = part == 1;
+    ulong open = candidates[word] & (pyramid ? ~cuboid : cuboid);
+    if (open == 0) continue;
+    const float2 c = (float2)((float)i - g.center_i, (float)j - g.center_j);
+    const float3 direction = pyramid ? (float3)(c.x / g.fx, c.y / g.fy, 1.0f) : (float3)(0.0f, 0.0f, 1.0f);
+    const float3 base = pyramid ? (float3)(0.0f) : (float3)(c.x * g.delta_min, c.y * g.delta_min, 0.0f);
+    ulong settled = 0;
+    for (int v = 0; v < view_count && open != 0; ++v) {
+      const View view = views[v];
+      const float3 a = transform_point(&view.T_camera_world, base), b = rotate(&view.T_camera_world, direction);
+      const float z_first = layer_depth[64 * w + lowest_bit(open)], z_last = layer_depth[64 * w + highest_bit(open)];
+      if (segment_outside(&view, a + z_first * b, a + z_last * b)) continue;
+      ulong known = 0;
+      for (ulong left = open; left != 0; left &= left - 1) {
+        const int bit = lowest_bit(left);
+        if (view_knows(&view, depths, a + layer_depth[64 * w + bit] * b)) known |= 1ul << bit;
+      }
+      open &= ~known;
+      settled |= known;
+    }
+    candidates[word] &= ~settled;
+  }
+}

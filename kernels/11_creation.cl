@@ -1,0 +1,50 @@
+// Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
+
+// Normal of a surfel at voxel v, camera frame, not normalised: the mean direction to the observed ones of the 26 voxels around it.
+float3 observed_direction(const Grid* g, __global const ulong* observed, int3 v) {
+  const float3 center = from_grid(g, convert_float3(v));
+  float3 sum = (float3)(0.0f);
+  for (int dk = -1; dk <= 1; ++dk) {
+    for (int dj = -1; dj <= 1; ++dj) {
+      for (int di = -1; di <= 1; ++di) {
+        const int3 u = v + (int3)(di, dj, dk);
+        if (!inside_grid(g, u) || !test_bit(g, observed, u)) continue;  // v itself is not observed
+        sum += normalize(from_grid(g, convert_float3(u)) - center);
+      }
+    }
+  }
+  return sum;
+}
+
+// New surfel filter. One work item a word: candidates whose directions cancel make no surfel.
+__kernel void filter_candidates(const Grid g, const Limits limits, __global const ulong* observed, __global ulong* candidates) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  ulong kept = candidates[word];
+  for (ulong left = kept; left != 0; left &= left - 1) {
+    const int bit = lowest_bit(left);
+    if (length(observed_direction(&g, observed, (int3)(i, j, 64 * w + bit))) < limits.normal_min) kept &= ~(1ul << bit);
+  }
+  candidates[word] = kept;
+}
+
+// One work item a new surfel.
+//   in  voxels[count]: 64 word + bit of each candidate
+//   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
+__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, __global const ulong* observed,
+                             __global const uint* voxels, const uint count, __global float4* position_radius,
+                             __global float4* normal_attributes, __global uint* changed, const uint frame, __global const uint* free_slots,
+                             const uint free_count, const uint slots, __global uint* in_view_slots, const uint in_view) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const int3 v = (int3)(i, j, 64 * w + voxels[n] % 64);
+  const float3 p = from_grid(&g, convert_float3(v));
+  const float3 normal = normalize(observed_direction(&g, observed, v));
+  const uint slot = new_slot(n, free_slots, free_count, slots);
+  position_radius[slot] = (float4)(transform_point(&T_world_camera, p), limits.create_radius * voxel_size(&g, p.z));
+  normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE));
+  changed[slot] = frame;
+  in_view_slots[in_view + n] = slot;
+}

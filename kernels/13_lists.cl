@@ -1,0 +1,52 @@
+// Lists in a fixed order from bit fields and counts, whatever the number of threads: counts, their prefix sum, then the entries.
+
+// One work item a word: set bits.
+__kernel void count_bits(__global const ulong* words, const uint count, __global uint* counts) {
+  const uint n = get_global_id(0);
+  if (n < count) counts[n] = popcount(words[n]);
+}
+
+// One work item a chunk of SCAN_CHUNK values: their sum.
+__kernel void sum_chunks(__global const uint* values, const uint count, __global uint* chunk_sums) {
+  const uint chunk = get_global_id(0);
+  const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
+  if (begin >= count) return;
+  uint sum = 0;
+  for (uint n = begin; n < end; ++n) sum += values[n];
+  chunk_sums[chunk] = sum;
+}
+
+// One work item a chunk: values become the sums of all values before them.
+//   in  chunk_offsets: sum of all chunks before;   i/o values[count + 1]: the last becomes the total
+__kernel void scan_chunks(__global uint* values, const uint count, __global const uint* chunk_offsets) {
+  const uint chunk = get_global_id(0);
+  const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
+  if (begin >= count) return;
+  uint sum = chunk_offsets[chunk];
+  for (uint n = begin; n < end; ++n) {
+    const uint value = values[n];
+    values[n] = sum;
+    sum += value;
+  }
+  if (end == count) values[count] = sum;
+}
+
+// One work item: the prefix sum of few values, the total behind them.
+__kernel void scan_few(__global uint* values, const uint count) {
+  if (get_global_id(0) > 0) return;
+  uint sum = 0;
+  for (uint n = 0; n < count; ++n) {
+    const uint value = values[n];
+    values[n] = sum;
+    sum += value;
+  }
+  values[count] = sum;
+}
+
+// One work item a word: the numbers 64 n + bit of its set bits.
+__kernel void list_bits(__global const ulong* words, const uint count, __global const uint* offsets, __global uint* list) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  uint at = offsets[n];
+  for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
+}

@@ -1,0 +1,60 @@
+// Observed space C~ - paper 3.3, eq. (9)-(11).
+//
+// A depth image pixel is > 0: a measured surface there; < 0: nothing is met up to -depth; 0: no measurement.
+
+// One work item a pixel: the first layer that its ray does not observe, 0 where there is no measurement.
+//   in  depth[height][width] [m];  layer_depth[size_k]: z of each layer's centre [m], ascending
+//   out column_end[height][width]: layers first_pyramid_layer ... column_end - 1 are observed
+__kernel void column_ends(const Grid g, __global const float* depth, __global const float* layer_depth, __global int* column_end) {
+  const int pixel = get_global_id(0);
+  if (pixel >= g.width * g.height) return;
+  const float d = fabs(depth[pixel]);
+  int low = 0, high = g.size_k;  // z(low - 1) < d <= z(high)
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (layer_depth[middle] < d) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  column_end[pixel] = d > 0.0f ? low : 0;
+}
+
+// One work item a word: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid pixel's ray has its sample of
+// that layer in it, that is, iff there is one in a fixed rectangle of the image.
+//   in  column_end[height][width];  valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
+//       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies there
+//   out observed: bit field
+__kernel void observed_space(const Grid g, __global const int* column_end, __global const int* valid_above,
+                             __global const ushort2* pixels_i, __global const ushort2* pixels_j, __global ulong* observed) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+
+  ulong bits = 0;
+  const int s = i - g.padding_i, t = j - g.padding_j;
+  if (s >= 0 && s < g.width && t >= 0 && t < g.height) {
+    bits = bit_run(g.first_pyramid_layer - 64 * w, column_end[t * g.width + s] - 64 * w);
+  }
+
+  const int stride = g.width + 1;
+  const int cuboid_end = min(64 * (w + 1), g.first_pyramid_layer);
+  for (int k = max(64 * w, g.padding_k); k < cuboid_end; ++k) {
+    const ushort2 column = pixels_i[k * g.size_i + i], row = pixels_j[k * g.size_j + j];
+    if (column.x >= column.y || row.x >= row.y) continue;
+    __global const int* top = valid_above + row.x * stride;
+    __global const int* bottom = valid_above + row.y * stride;
+    if (bottom[column.y] - bottom[column.x] - top[column.y] + top[column.x] > 0) bits |= 1ul << (k - 64 * w);
+  }
+  observed[word] = bits & valid_layers(&g, w);
+}
+
+// Exact membership in the space that one view has seen (its pixel there is valid and lies deeper).
+//   depths: all views' images;  p: in the view's camera frame [m]
+bool view_knows(const View* view, __global const float* depths, float3 p) {
+  if (!(p.z > 0.0f)) return false;
+  const float s = floor(p.x * view->fx / p.z + view->cx + 0.5f), t = floor(p.y * view->fy / p.z + view->cy + 0.5f);
+  if (!(s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height)) return false;
+  return p.z < fabs(depths[view->first_pixel + (int)t * view->width + (int)s]);
+}

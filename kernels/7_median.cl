@@ -1,0 +1,50 @@
+// Median - paper eq. (8): K~(v) = 1 iff enough of the 27 voxels around v have K' = 1. Beyond the grid its border repeats.
+
+// A word's bits moved so that bit k holds what layer k + 1, k - 1 has.
+ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int w) {
+  const ulong here = field[word_index(g, i, j, w)];
+  const ulong carry = w + 1 < g->words_k ? field[word_index(g, i, j, w + 1)] << 63 : 0;
+  const int last = g->size_k - 1 - 64 * w;  // bit of the grid's last layer
+  const ulong border = last < 64 ? here & (1ul << last) : 0;
+  return (here >> 1) | carry | border;
+}
+
+ulong layer_below(const Grid* g, __global const ulong* field, int i, int j, int w) {
+  const ulong here = field[word_index(g, i, j, w)];
+  return (here << 1) | (w > 0 ? field[word_index(g, i, j, w - 1)] >> 63 : here & 1);
+}
+
+// One work item a word: 64 counts at once, bit n of a count in plane n.
+//   in  known: K', zero beyond the last layer;   out filtered: K~
+__kernel void median(const Grid g, const Limits limits, __global const ulong* known, __global ulong* filtered) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const ulong layers = valid_layers(&g, w);
+
+  ulong plane[5] = {0, 0, 0, 0, 0};
+  for (int dj = -1; dj <= 1; ++dj) {
+    for (int di = -1; di <= 1; ++di) {
+      const int ni = clamp(i + di, 0, g.size_i - 1), nj = clamp(j + dj, 0, g.size_j - 1);
+      const ulong a = layer_below(&g, known, ni, nj, w), b = known[word_index(&g, ni, nj, w)], c = layer_above(&g, known, ni, nj, w);
+      const ulong ones = a ^ b ^ c, twos = (a & b) | (c & (a ^ b));  // their sum, two bits
+      ulong carry = plane[0] & ones;
+      plane[0] ^= ones;
+      const ulong carry_1 = (plane[1] & twos) | (carry & (plane[1] ^ twos));
+      plane[1] ^= twos ^ carry;
+      carry = plane[2] & carry_1;
+      plane[2] ^= carry_1;
+      const ulong carry_3 = plane[3] & carry;
+      plane[3] ^= carry;
+      plane[4] ^= carry_3;
+    }
+  }
+
+  ulong greater = 0, equal = ~0ul;  // the counts compared with the votes, highest bit first
+  for (int bit = 4; bit >= 0; --bit) {
+    const ulong votes = (limits.median_votes >> bit) & 1 ? ~0ul : 0;
+    greater |= equal & plane[bit] & ~votes;
+    equal &= ~(plane[bit] ^ votes);
+  }
+  filtered[word] = (greater | equal) & layers;
+}

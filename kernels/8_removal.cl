@@ -1,0 +1,46 @@
+// Removal - paper 3.4, eq. (12): surfels in observed space go; the voxels of the others are noted.
+
+// One work item a surfel in view, one group a word.
+//   in  observed: C~;  view, depths: this frame, for the exact test
+//   i/o occupied_voxels: bit field as 32-bit halves, zero before
+//   out removed[ceil(count / 64)]: bit n % 64 of word n / 64 for surfel n in view
+__kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_removed(const Grid g, const View view, const int remove_buried,
+                                                                          __global const float* depths,
+                                                                          __global const ViewSurfel* view_surfels, const uint count,
+                                                                          __global const float4* position_radius,
+                                                                          __global const ulong* observed, __global uint* occupied_voxels,
+                                                                          __global ulong* removed) {
+  __local uchar mark[64];
+  const uint n = get_global_id(0), lane = get_local_id(0);
+  mark[lane] = 0;
+  if (n < count) {
+    const ViewSurfel s = view_surfels[n];
+    const int3 v = voxel_of((float3)(s.i, s.j, s.k));
+    if (inside_grid(&g, v)) {
+      const float4 position = position_radius[s.slot];
+      const float3 behind = transform_point(&view.T_camera_world, position.xyz) - 0.25f * position.w * (float3)(s.n_x, s.n_y, s.n_z);
+      mark[lane] = test_bit(&g, observed, v) || (remove_buried && view_knows(&view, depths, behind));
+      if (!mark[lane]) atomic_or(&occupied_voxels[2 * word_index(&g, v.x, v.y, v.z >> 6) + ((v.z >> 5) & 1)], 1u << (v.z & 31));
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (lane == 0) {
+    ulong bits = 0;
+    for (int bit = 0; bit < 64; ++bit) bits |= (ulong)mark[bit] << bit;
+    removed[get_group_id(0)] = bits;
+  }
+}
+
+// One work item a removed surfel: its slot becomes free.
+//   in  removed_list[count]: numbers of surfels in view
+//   out free_slots[free_count ...];  the map: the surfel is no longer alive
+__kernel void remove_surfels(__global const uint* removed_list, const uint count, __global const ViewSurfel* view_surfels,
+                             __global float4* normal_attributes, __global uint* changed, const uint frame, __global uint* free_slots,
+                             const uint free_count) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint slot = view_surfels[removed_list[n]].slot;
+  normal_attributes[slot].w = as_float(0u);
+  changed[slot] = frame;
+  free_slots[free_count + n] = slot;
+}

@@ -1,0 +1,18 @@
+/// Values of Config fields as text: one way for YAML files, sentences and tables.
+#pragma once
+
+#include <string>
+
+namespace frontier_surfels {
+
+inline std::string to_text(bool value) { return value ? "true" : "false"; }
+inline std::string to_text(int value) { return std::to_string(value); }
+inline std::string to_text(const std::string& value) { return value; }
+
+/// The shortest decimal text that reads back as the same number; .nan, .inf, -.inf as YAML writes them.
+std::string to_text(double value);
+
+/// "; did you mean 'x'?" with the field's name nearest to `name`, or where to find all names if none is near.
+std::string suggestion(const std::string& name);
+
+}  // namespace frontier_surfels

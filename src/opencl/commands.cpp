@@ -1,0 +1,64 @@
+#include "opencl/commands.hpp"
+
+#include <algorithm>
+
+#include "opencl/kernel_files.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+/// All kernel files as one source; compiler messages name the file and its own lines.
+std::string source() {
+  std::string text;
+  for (const auto& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
+  return text;
+}
+
+cl::Program build(const Device& device) {
+  const std::string options = std::string("-cl-std=CL1.2 -Werror -DSIGN_FIELD_GROUP=") + (device.is_cpu ? "1" : "64");
+  cl::Program program(device.context, source());
+  try {
+    program.build({device.device}, options.c_str());
+  } catch (const cl::Error&) {
+    throw DeviceError("The kernels do not build on " + device.description + " with " + options + ":\n" +
+                      program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device.device));
+  }
+  return program;
+}
+
+}  // namespace
+
+Commands::Commands(Device device) : device_(std::move(device)) {
+  try {
+    queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
+    std::vector<cl::Kernel> kernels;
+    build(device_).createKernels(&kernels);
+    for (const auto& kernel : kernels) kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
+  } catch (const cl::Error& error) {
+    throw device_error(error);
+  }
+}
+
+std::vector<StageTime> Commands::take_times() {
+  queue_.finish();
+  std::vector<StageTime> times;
+  for (const auto& [stage, event] : events_) {
+    auto found = std::find_if(times.begin(), times.end(), [&name = stage](const StageTime& time) { return time.name == name; });
+    if (found == times.end()) found = times.insert(times.end(), StageTime{stage, 0});
+    found->ms += 1e-6 * (event.getProfilingInfo<CL_PROFILING_COMMAND_END>() - event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+  }
+  events_.clear();
+  return times;
+}
+
+cl::Buffer Commands::allocate(std::size_t bytes) {
+  const std::size_t most = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  if (bytes > most)
+    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " + std::to_string(most >> 20) +
+                      " MiB; raise decimation, lower z_max or choose another device.");
+  cl::Buffer buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+  allocated_bytes_ += bytes;
+  return buffer;
+}
+
+}  // namespace frontier_surfels

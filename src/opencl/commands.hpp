@@ -1,0 +1,107 @@
+/// The program, its queue, buffers that grow, and the time that each stage took.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+#include "opencl/device.hpp"
+
+namespace frontier_surfels {
+
+/// Builds all kernels once; launches them by name and notes their times.
+class Commands {
+ public:
+  explicit Commands(Device device);
+
+  const Device& device() const { return device_; }
+  cl::CommandQueue& queue() { return queue_; }
+
+  /// Launches a kernel over at least `items` work items, in groups of `group`, and counts its time to `stage`.
+  template <typename... Args>
+  void run(const char* stage, const char* kernel, std::size_t items, std::size_t group, const Args&... args) {
+    if (items == 0) return;
+    run(stage, kernel, cl::NDRange((items + group - 1) / group * group), cl::NDRange(group), args...);
+  }
+
+  template <typename... Args>
+  void run(const char* stage, const char* kernel, const cl::NDRange& global, const cl::NDRange& local, const Args&... args) {
+    cl::KernelFunctor<Args...> functor(kernels_.at(kernel));
+    note(stage, functor(cl::EnqueueArgs(queue_, global, local), args...));
+  }
+
+  void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }
+
+  /// Waits for all launches; device time of each stage since the last call, in the order of their first launch.
+  std::vector<StageTime> take_times();
+
+  /// Drops the times noted so far.
+  void forget_times() { events_.clear(); }
+
+  cl::Buffer allocate(std::size_t bytes);
+  void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
+  std::size_t allocated_bytes() const { return allocated_bytes_; }
+
+ private:
+  Device device_;
+  cl::CommandQueue queue_;
+  std::map<std::string, cl::Kernel> kernels_;
+  std::vector<std::pair<std::string, cl::Event>> events_;
+  std::size_t allocated_bytes_ = 0;
+};
+
+/// A buffer of T that only ever grows.
+template <typename T>
+class DeviceArray {
+ public:
+  explicit DeviceArray(Commands& commands) : commands_(&commands) {}
+  ~DeviceArray() { commands_->release(capacity_ * sizeof(T)); }
+  DeviceArray(const DeviceArray&) = delete;
+  DeviceArray& operator=(const DeviceArray&) = delete;
+
+  /// Makes room for `size` elements; what it held is lost if it grows.
+  void resize(std::size_t size) { grow(size, 0); }
+
+  /// Makes room for `size` elements, with some to spare, and keeps the first `kept`.
+  void grow(std::size_t size, std::size_t kept) {
+    if (size <= capacity_) return;
+    const std::size_t larger = size + size / 4;
+    const cl::Buffer bigger = commands_->allocate(larger * sizeof(T));
+    if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
+    commands_->release(capacity_ * sizeof(T));
+    buffer_ = bigger;
+    capacity_ = larger;
+  }
+
+  void write(const std::vector<T>& values, std::size_t offset = 0) {
+    if (values.empty()) return;
+    grow(offset + values.size(), offset);
+    commands_->queue().enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
+  }
+
+  std::vector<T> read(std::size_t size, std::size_t offset = 0) const {
+    std::vector<T> values(size);
+    if (size > 0) commands_->queue().enqueueReadBuffer(buffer_, CL_TRUE, offset * sizeof(T), size * sizeof(T), values.data());
+    return values;
+  }
+
+  T read_one(std::size_t index) const { return read(1, index).front(); }
+
+  void fill(const char* stage, T value, std::size_t size) {
+    cl::Event event;
+    commands_->queue().enqueueFillBuffer(buffer_, value, 0, size * sizeof(T), nullptr, &event);
+    commands_->note(stage, event);
+  }
+
+  const cl::Buffer& operator()() const { return buffer_; }
+  std::size_t bytes() const { return capacity_ * sizeof(T); }
+
+ private:
+  Commands* commands_;
+  cl::Buffer buffer_;
+  std::size_t capacity_ = 0;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,20 @@
+/// Choice of the OpenCL device.
+#pragma once
+
+#include "frontier_surfels/config.hpp"
+#include "opencl/opencl.hpp"
+
+namespace frontier_surfels {
+
+struct Device {
+  cl::Device device;
+  cl::Context context;
+  bool is_cpu = false;
+  std::string description;  ///< platform, name and compute units
+};
+
+/// The device that platform, device_type, device_index and threads ask for.
+/// @throws DeviceError with a list of all devices if there is none, or if it lacks what the kernels need
+Device choose_device(const Config& config);
+
+}  // namespace frontier_surfels

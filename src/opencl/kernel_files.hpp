@@ -1,0 +1,17 @@
+/// The kernels' source, embedded at build time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace frontier_surfels {
+
+struct KernelFile {
+  std::string name;
+  std::string text;
+};
+
+/// All files of kernels/, in their order.
+const std::vector<KernelFile>& kernel_files();
+
+}  // namespace frontier_surfels

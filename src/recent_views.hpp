@@ -1,0 +1,56 @@
+/// The ring of recent views - our addition to the paper: exact knowledge of what the last views have seen.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <deque>
+#include <vector>
+
+#include "0_shared.h"
+#include "frontier_surfels/config.hpp"
+#include "opencl/commands.hpp"
+#include "working_image.hpp"
+
+namespace frontier_surfels {
+
+/// T as the kernels take it.
+Transform to_transform(const Eigen::Isometry3d& T);
+
+class RecentViews {
+ public:
+  RecentViews(Commands& commands, const Config& config);
+
+  /// Sends this frame's depths to the device; they are current_view()'s until the next call.
+  void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
+  View current_view() const;
+
+  /// Sends the kept views, newest first, each with its pose relative to the current camera. @return how many there are
+  int prepare();
+
+  /// Keeps the current view if it adds something. @return whether it did
+  bool keep_current();
+
+  void clear() { kept_.clear(); }
+
+  const cl::Buffer& views() const { return views_(); }
+  const cl::Buffer& depths() const { return depths_(); }
+  std::size_t count() const { return kept_.size(); }
+
+ private:
+  struct Kept {
+    Intrinsics intrinsics;
+    Eigen::Isometry3d T_world_camera;
+    std::size_t room = 0;  ///< in the pool, counted in images
+  };
+  View to_view(const Kept& kept, const Eigen::Isometry3d& T_camera_source) const;
+  bool adds_something() const;
+
+  Config config_;
+  std::size_t room_pixels_ = 0;  ///< pixels of the largest image so far
+  Kept current_;
+  std::deque<Kept> kept_;  ///< newest first
+  DeviceArray<View> views_;
+  DeviceArray<float> depths_;  ///< [recent_views + 1][room_pixels_]: the kept views' images and the current one's
+  Commands& commands_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,84 @@
+/// The boxes of the paper's flow chart on the device: buffers and launches. The only place that names kernels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "0_shared.h"
+#include "frontier_surfels/config.hpp"
+#include "opencl/commands.hpp"
+#include "recent_views.hpp"
+#include "surfel_map.hpp"
+#include "view_grid.hpp"
+#include "working_image.hpp"
+
+namespace frontier_surfels {
+
+class Stages {
+ public:
+  Stages(Commands& commands, const Config& config, SurfelMap& map, RecentViews& views);
+
+  /// Sends a frame's image and, where the camera has changed, its grid. @param frame  number that changed surfels get
+  void begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
+
+  void observe_space();             ///< C~
+  std::size_t select_in_view();     ///< @return surfels that touch the grid
+  std::size_t split_surfels();      ///< @return surfels that this adds to the map
+  void compute_sign_field();        ///< events of D
+  void compute_known_hull();        ///< states in which paths enter the grid
+  void sweep_paths();               ///< K'
+  void filter_median();             ///< K~
+  void mark_removed();              ///< surfels in observed space; nothing is removed yet
+  void find_candidates();           ///< voxels for new surfels by C~, K~ and the surfels that stay
+  void settle_by_recent_views();    ///< candidates that a kept view knows are dropped
+  void filter_candidates();         ///< candidates without a normal are dropped
+  std::size_t remove_surfels();     ///< @return how many; device memory for what create_surfels adds is made sure of before
+  std::size_t create_surfels();     ///< @return how many
+  void label_surfels();
+
+ private:
+  friend class StagesProbe;  // tests read and write the fields between stages
+
+  std::size_t words() const { return static_cast<std::size_t>(grid_.size_i) * grid_.size_j * grid_.words_k; }
+  void set_grid(const WorkingImage& image);
+  void allocate_grid();
+  std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level = 0);
+  std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
+
+  Commands& commands_;
+  SurfelMap& map_;
+  RecentViews& views_;
+  Config config_;
+  Limits limits_;
+
+  // This frame
+  Intrinsics intrinsics_ = {};  // of the working image that the grid is for
+  Grid grid_ = {};
+  Transform T_camera_world_ = {}, T_world_camera_ = {};
+  View view_ = {};
+  std::uint32_t frame_ = 0;
+  bool has_color_ = false;
+  std::size_t in_view_ = 0, removed_count_ = 0, created_count_ = 0;
+
+  // Image and grid
+  DeviceArray<float> depth_, layer_depth_;
+  DeviceArray<cl_int> valid_above_, column_end_;
+  DeviceArray<cl_uint> color_;
+  DeviceArray<PixelRange> pixels_i_, pixels_j_;
+
+  // Bit fields
+  DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, occupied_voxels_, candidates_;
+  DeviceArray<cl_uint> hull_faces_;
+
+  // Surfels in view
+  DeviceArray<cl_ulong> in_view_bits_, removed_bits_;
+  DeviceArray<cl_uint> in_view_slots_, split_offsets_, removed_list_, created_voxels_;
+  DeviceArray<ViewSurfel> view_surfels_;
+  DeviceArray<cl_uint> tile_begin_, tile_cursor_, tile_surfels_;
+
+  // Prefix sums
+  DeviceArray<cl_uint> counts_;
+  DeviceArray<cl_uint> scan_levels_[4];
+};
+
+}  // namespace frontier_surfels

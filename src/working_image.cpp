@@ -1,0 +1,117 @@
+#include "working_image.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+namespace frontier_surfels {
+namespace {
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+void check_depth(const DepthImage& image, const Config& config) {
+  const std::size_t pixel = image.encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4;
+  if (image.width < config.decimation || image.height < config.decimation)
+    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
+                   std::to_string(config.decimation) + "; lower decimation.");
+  constexpr int kLargest = 16384;  // footprints are 16-bit, sums of pixels 32-bit
+  if (image.width > kLargest || image.height > kLargest)
+    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
+                   size_text(kLargest, kLargest) + ".");
+  if (image.data == nullptr) throw BadFrame("The depth image has no data.");
+  if (image.step < image.width * pixel)
+    throw BadFrame("The depth image's rows of " + std::to_string(image.step) + " bytes are shorter than its " +
+                   std::to_string(image.width) + " pixels.");
+}
+
+void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
+  if (!(std::isfinite(k.fx) && std::isfinite(k.fy) && k.fx > 0 && k.fy > 0))
+    throw BadFrame("The focal lengths " + std::to_string(k.fx) + ", " + std::to_string(k.fy) +
+                   " must be positive: is the camera calibrated, and its camera_info published?");
+  if (!(std::isfinite(k.cx) && std::isfinite(k.cy))) throw BadFrame("The principal point of the camera is not a number.");
+  if (k.width != image.width || k.height != image.height)
+    throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +
+                   size_text(image.width, image.height) + ".");
+}
+
+void check_pose(const Eigen::Isometry3d& T_world_camera) {
+  if (!T_world_camera.matrix().allFinite()) throw BadFrame("The camera's pose is missing or not finite.");
+  const Eigen::Matrix3d R = T_world_camera.linear();
+  constexpr double kTolerance = 1e-3;
+  if (!(R.transpose() * R).isIdentity(kTolerance) || R.determinant() < 0)
+    throw BadFrame("The camera's orientation is not a rotation: normalise its quaternion.");
+  if (T_world_camera.translation().cwiseAbs().maxCoeff() > 1e5)
+    throw BadFrame("The camera is more than 100 km from the world's origin, where a float no longer resolves a voxel; move the origin.");
+}
+
+void check_color(const ColorImage& color, const DepthImage& depth) {
+  if (color.width != depth.width || color.height != depth.height)
+    throw BadFrame("The colour image of " + size_text(color.width, color.height) + " pixels is not registered to the depth image of " +
+                   size_text(depth.width, depth.height) + ".");
+  if (color.data == nullptr || (color.channels != 3 && color.channels != 4) ||
+      color.step < static_cast<std::size_t>(color.width) * color.channels)
+    throw BadFrame("The colour image must have 3 or 4 bytes a pixel and rows no shorter than that.");
+}
+
+float read_depth(const DepthImage& image, int s, int t) {
+  const auto* row = static_cast<const std::uint8_t*>(image.data) + t * image.step;
+  if (image.encoding == DepthImage::Encoding::kMillimetresU16) {
+    std::uint16_t millimetres;
+    std::memcpy(&millimetres, row + 2 * s, 2);
+    if (image.swap_bytes) millimetres = __builtin_bswap16(millimetres);
+    return static_cast<float>(millimetres) * 0.001f;
+  }
+  std::uint32_t bits;
+  std::memcpy(&bits, row + 4 * s, 4);
+  if (image.swap_bytes) bits = __builtin_bswap32(bits);
+  float metres;
+  std::memcpy(&metres, &bits, 4);
+  return metres;
+}
+
+/// What a depth says: > 0 a surface, < 0 nothing up to its magnitude, 0 no measurement.
+float interpret(float d, const Config& config) {
+  const float z_max = static_cast<float>(config.z_max);
+  if (std::isnan(d) || d < static_cast<float>(config.z_min)) return 0;
+  if (d <= z_max) return d;
+  return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
+}
+
+std::uint32_t read_color(const ColorImage& image, int s, int t) {
+  const std::uint8_t* pixel = image.data + t * image.step + static_cast<std::size_t>(s) * image.channels;
+  const bool rgb = image.order == ColorImage::Order::kRgb;
+  return pixel[rgb ? 0 : 2] | pixel[1] << 8 | pixel[rgb ? 2 : 0] << 16;
+}
+
+}  // namespace
+
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
+  check_depth(frame.depth, config);
+  check_intrinsics(frame.intrinsics, frame.depth);
+  check_pose(frame.T_world_camera);
+  if (frame.color) check_color(*frame.color, frame.depth);
+
+  const int step = config.decimation, width = frame.depth.width / step, height = frame.depth.height / step;
+  const Intrinsics& full = frame.intrinsics;
+  WorkingImage image;
+  image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
+  image.depth.resize(static_cast<std::size_t>(width) * height);
+  image.valid_above.assign(static_cast<std::size_t>(width + 1) * (height + 1), 0);
+  for (int t = 0; t < height; ++t) {
+    std::int32_t valid_in_row = 0;
+    for (int s = 0; s < width; ++s) {
+      const float d = interpret(read_depth(frame.depth, s * step, t * step), config);
+      image.depth[t * width + s] = d;
+      valid_in_row += d != 0;
+      image.valid_above[(t + 1) * (width + 1) + s + 1] = image.valid_above[t * (width + 1) + s + 1] + valid_in_row;
+    }
+  }
+  if (frame.color) {
+    image.color.reserve(image.depth.size());
+    for (int t = 0; t < height; ++t)
+      for (int s = 0; s < width; ++s) image.color.push_back(read_color(*frame.color, s * step, t * step));
+  }
+  return image;
+}
+
+}  // namespace frontier_surfels
