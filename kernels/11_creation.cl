@@ -1,3 +1,10 @@
+#ifndef SLIDE
+#define SLIDE 4
+#define MARGIN 1.0f
+#define FRONT 1
+#define RING 1
+#define RING_MARGIN 1.0f
+#endif
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
 // Normal of a surfel at voxel v, camera frame, not normalised: the mean direction to the observed ones of the 26 voxels around it.
@@ -29,11 +36,34 @@ __kernel void filter_candidates(const Grid g, const Limits limits, __global cons
   candidates[word] = kept;
 }
 
+bool any_view_knows(__global const View* views, const int view_count, __global const float* depths, float3 p) {
+  for (int n = 0; n < view_count; ++n) {
+    const View view = views[n];
+    if (view_knows(&view, depths, transform_point(&view.T_camera_world, p))) return true;
+  }
+  return false;
+}
+// Where in its voxel a surfel stands: slid along its normal up to where this view knows the space, so that it is near the boundary.
+float3 slide_to_boundary(const Grid* g, const View* view, __global const View* views, const int view_count, __global const float* depths, int3 v, float3 center, float3 normal) {
+  const float size = voxel_size(g, center.z);
+  const float step = 0.1f * size;
+  float3 p = center;
+  const bool front = view_knows(view, depths, p + 1.5155f * size * normal);
+  for (int n = 0; n < SLIDE; ++n) {
+    const float3 next = p + step * normal;
+    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next + MARGIN * step * normal)) break;
+    if (FRONT && front && !view_knows(view, depths, next + 1.5155f * size * normal)) break;
+    if (RING && any_view_knows(views, view_count, depths, next + RING_MARGIN * step * normal)) break;
+    p = next;
+  }
+  return p;
+}
+
 // One work item a new surfel.
-//   in  voxels[count]: 64 word + bit of each candidate
+//   in  voxels[count]: 64 word + bit of each candidate;  view, depths: this frame's
 //   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
-__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, __global const ulong* observed,
-                             __global const uint* voxels, const uint count, __global float4* position_radius,
+__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const View view, __global const View* views, const int view_count,
+                             __global const float* depths, __global const ulong* observed, __global const uint* voxels, const uint count, __global float4* position_radius,
                              __global float4* normal_attributes, __global uint* changed, const uint frame, __global const uint* free_slots,
                              const uint free_count, const uint slots, __global uint* in_view_slots, const uint in_view) {
   const uint n = get_global_id(0);
@@ -43,7 +73,8 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Transform 
   const float3 p = from_grid(&g, convert_float3(v));
   const float3 normal = normalize(observed_direction(&g, observed, v));
   const uint slot = new_slot(n, free_slots, free_count, slots);
-  position_radius[slot] = (float4)(transform_point(&T_world_camera, p), limits.create_radius * voxel_size(&g, p.z));
+  const float3 placed = slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal);
+  position_radius[slot] = (float4)(transform_point(&T_world_camera, placed), limits.create_radius * voxel_size(&g, p.z));
   normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE));
   changed[slot] = frame;
   in_view_slots[in_view + n] = slot;

@@ -49,8 +49,7 @@ std::string to_text(double value) {
     std::istringstream back(text.str());
     back.imbue(std::locale::classic());
     double read = 0;
-    back >> read;
-    if (read == value || digits == Digits::max_digits10) return text.str();
+    if ((back >> read && read == value) || digits == Digits::max_digits10) return text.str();
   }
 }
 

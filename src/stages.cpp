@@ -213,7 +213,9 @@ std::size_t Stages::remove_surfels() {
 }
 
 std::size_t Stages::create_surfels() {
-  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, observed_(), created_voxels_(),
+  View own = view_;  // as the camera itself sees it
+  own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
+  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, own, views_.views(), (cl_int)views_.count(), views_.depths(), observed_(), created_voxels_(),
                 static_cast<cl_uint>(created_count_), map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_,
                 map_.free_list(), static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()), in_view_slots_(),
                 static_cast<cl_uint>(in_view_));
@@ -223,7 +225,7 @@ std::size_t Stages::create_surfels() {
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, T_camera_world_, depth_(), column_end_(), color_(),
+  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, T_camera_world_, static_cast<float>(config_.surface_depth), depth_(), column_end_(), color_(),
                 static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.position_radius(),
                 map_.normal_attributes(), map_.changed(), frame_);
 }

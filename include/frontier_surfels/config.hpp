@@ -32,10 +32,13 @@ struct Config {
   int median_votes = 14;
 
   // Recent views (ours)
-  int recent_views = 10;
-  double recent_view_distance = 0.02;
-  double recent_view_angle = 2.0;
+  int recent_views = 100;
+  double recent_view_distance = 0.005;
+  double recent_view_angle = 0.4;
   bool remove_buried = true;
+
+  // Labels (paper 3.5)
+  double surface_depth = 0.03;
 
   /// Every fault, one sentence each; empty when the configuration can be used.
   std::vector<std::string> problems() const;
@@ -80,6 +83,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.recent_view_distance);
   visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
   visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
+  visit(FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1}, config.surface_depth);
 }
 
 /// Reads a flat YAML map of fields over the defaults. Values out of range are left to problems().
