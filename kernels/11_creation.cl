@@ -1,77 +1,78 @@
-#ifndef SLIDE
-#define SLIDE 4
-#define MARGIN 1.0f
-#define FRONT 1
-#define RING 1
-#define RING_MARGIN 1.0f
-#endif
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
 // Normal of a surfel at voxel v, camera frame, not normalised: the mean direction to the observed ones of the 26 voxels around it.
-float3 observed_direction(const Grid* g, __global const ulong* observed, int3 v) {
-  const float3 center = from_grid(g, convert_float3(v));
+float3 observed_direction(const Grid* g, __global const float* layer_depth, __global const ulong* observed, int3 v) {
+  const float3 center = voxel_center(g, layer_depth, v);
   float3 sum = (float3)(0.0f);
   for (int dk = -1; dk <= 1; ++dk) {
     for (int dj = -1; dj <= 1; ++dj) {
       for (int di = -1; di <= 1; ++di) {
         const int3 u = v + (int3)(di, dj, dk);
         if (!inside_grid(g, u) || !test_bit(g, observed, u)) continue;  // v itself is not observed
-        sum += normalize(from_grid(g, convert_float3(u)) - center);
+        const float3 direction = voxel_center(g, layer_depth, u) - center;
+        sum += direction / length(direction);
       }
     }
   }
   return sum;
 }
 
-// New surfel filter. One work item a word: candidates whose directions cancel make no surfel.
-__kernel void filter_candidates(const Grid g, const Limits limits, __global const ulong* observed, __global ulong* candidates) {
+// New surfel filter. One work item a word: candidates that are known, or whose directions cancel, make no surfel.
+//   in  observed: C~;  known: K~;   i/o candidates
+__kernel void filter_candidates(const Grid g, const Limits limits, __global const float* layer_depth, __global const ulong* observed,
+                                __global const ulong* known, __global ulong* candidates) {
   const int word = get_global_id(0);
   if (word >= g.size_i * g.size_j * g.words_k) return;
   const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
-  ulong kept = candidates[word];
+  ulong kept = candidates[word] & ~known[word];
   for (ulong left = kept; left != 0; left &= left - 1) {
     const int bit = lowest_bit(left);
-    if (length(observed_direction(&g, observed, (int3)(i, j, 64 * w + bit))) < limits.normal_min) kept &= ~(1ul << bit);
+    if (length(observed_direction(&g, layer_depth, observed, (int3)(i, j, 64 * w + bit))) < limits.normal_min) kept &= ~(1ul << bit);
   }
   candidates[word] = kept;
 }
 
-bool any_view_knows(__global const View* views, const int view_count, __global const float* depths, float3 p) {
+INLINE bool any_view_knows(__global const View* views, int view_count, __global const float* depths, float3 p) {
   for (int n = 0; n < view_count; ++n) {
     const View view = views[n];
-    if (view_knows(&view, depths, transform_point(&view.T_camera_world, p))) return true;
+    const float3 q = transform_point(&view.T_camera_world, p);
+    if (q.z > 0.0f && view_knows(&view, depths, q)) return true;
   }
   return false;
 }
-// Where in its voxel a surfel stands: slid along its normal up to where this view knows the space, so that it is near the boundary.
-float3 slide_to_boundary(const Grid* g, const View* view, __global const View* views, const int view_count, __global const float* depths, int3 v, float3 center, float3 normal) {
+
+// Where in its voxel a surfel stands: slid along its normal until it is near the boundary, in steps of a tenth of a voxel. A step is left in
+// hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
+float3 slide_to_boundary(const Grid* g, const View* view, __global const View* views, int view_count, __global const float* depths, int3 v,
+                         float3 center, float3 normal) {
   const float size = voxel_size(g, center.z);
-  const float step = 0.1f * size;
-  float3 p = center;
-  const bool front = view_knows(view, depths, p + 1.5155f * size * normal);
-  for (int n = 0; n < SLIDE; ++n) {
-    const float3 next = p + step * normal;
-    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next + MARGIN * step * normal)) break;
-    if (FRONT && front && !view_knows(view, depths, next + 1.5155f * size * normal)) break;
-    if (RING && any_view_knows(views, view_count, depths, next + RING_MARGIN * step * normal)) break;
-    p = next;
+  const float3 step = 0.1f * size * normal, front = 1.75f * 0.8660254f * size * normal;
+  const bool has_front = view_knows(view, depths, center + front);
+  int steps = 0;
+  while (steps < 4) {
+    const float3 next = center + (float)(steps + 1) * step;
+    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next + step)) break;
+    if (has_front && !view_knows(view, depths, next + front)) break;
+    ++steps;
   }
-  return p;
+  while (steps > 0 && any_view_knows(views, view_count, depths, center + (float)(steps + 1) * step)) --steps;
+  return center + (float)steps * step;
 }
 
 // One work item a new surfel.
 //   in  voxels[count]: 64 word + bit of each candidate;  view, depths: this frame's
 //   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
 __kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const View view, __global const View* views, const int view_count,
-                             __global const float* depths, __global const ulong* observed, __global const uint* voxels, const uint count, __global float4* position_radius,
+                             __global const float* depths, __global const float* layer_depth, __global const ulong* observed,
+                             __global const uint* voxels, const uint count, __global float4* position_radius,
                              __global float4* normal_attributes, __global uint* changed, const uint frame, __global const uint* free_slots,
                              const uint free_count, const uint slots, __global uint* in_view_slots, const uint in_view) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const int3 v = (int3)(i, j, 64 * w + voxels[n] % 64);
-  const float3 p = from_grid(&g, convert_float3(v));
-  const float3 normal = normalize(observed_direction(&g, observed, v));
+  const float3 p = voxel_center(&g, layer_depth, v);
+  const float3 normal = normalize(observed_direction(&g, layer_depth, observed, v));
   const uint slot = new_slot(n, free_slots, free_count, slots);
   const float3 placed = slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal);
   position_radius[slot] = (float4)(transform_point(&T_world_camera, placed), limits.create_radius * voxel_size(&g, p.z));

@@ -5,10 +5,22 @@
 
 #pragma OPENCL FP_CONTRACT OFF
 
-float voxel_size(const Grid* g, float z) { return fmax(z, g->z_min) / g->f; }
+#define INLINE static inline __attribute__((always_inline))
+
+INLINE float voxel_size(const Grid* g, float z) { return fmax(z, g->z_min) / g->f; }
+
+// Rounding to whole numbers of either sign; a device without an instruction for ceil and floor does these much faster.
+INLINE int ceil_int(float x) {
+  const int below = (int)x;
+  return below + ((float)below < x ? 1 : 0);
+}
+INLINE int floor_int(float x) {
+  const int above = (int)x;
+  return above - ((float)above > x ? 1 : 0);
+}
 
 // F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.
-float3 to_grid(const Grid* g, float3 p) {
+INLINE float3 to_grid(const Grid* g, float3 p) {
   if (p.z < g->z_min) {
     return (float3)(p.x / g->delta_min + g->center_i, p.y / g->delta_min + g->center_j, p.z / g->delta_min + (float)g->padding_k);
   }
@@ -16,7 +28,7 @@ float3 to_grid(const Grid* g, float3 p) {
 }
 
 // F^-1: grid coordinates -> camera frame [m].
-float3 from_grid(const Grid* g, float3 c) {
+INLINE float3 from_grid(const Grid* g, float3 c) {
   if (c.z < g->k_min) {
     return (float3)((c.x - g->center_i) * g->delta_min, (c.y - g->center_j) * g->delta_min, (c.z - (float)g->padding_k) * g->delta_min);
   }
@@ -24,20 +36,27 @@ float3 from_grid(const Grid* g, float3 c) {
   return (float3)((c.x - g->center_i) * z / g->fx, (c.y - g->center_j) * z / g->fy, z);
 }
 
-int3 voxel_of(float3 c) { return convert_int3_rtn(c + 0.5f); }
+// F^-1 of a voxel's centre.
+//   layer_depth[size_k]: z of each layer's centre [m]
+INLINE float3 voxel_center(const Grid* g, __global const float* layer_depth, int3 v) {
+  const float z = layer_depth[v.z], dx = (float)v.x - g->center_i, dy = (float)v.y - g->center_j;
+  return (float)v.z < g->k_min ? (float3)(dx * g->delta_min, dy * g->delta_min, z) : (float3)(dx * z / g->fx, dy * z / g->fy, z);
+}
 
-bool inside_grid(const Grid* g, int3 v) {
+INLINE int3 voxel_of(float3 c) { return (int3)(floor_int(c.x + 0.5f), floor_int(c.y + 0.5f), floor_int(c.z + 0.5f)); }
+
+INLINE bool inside_grid(const Grid* g, int3 v) {
   return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < g->size_i && v.y < g->size_j && v.z < g->size_k;
 }
 
-int word_index(const Grid* g, int i, int j, int w) { return (j * g->words_k + w) * g->size_i + i; }
+INLINE int word_index(const Grid* g, int i, int j, int w) { return (j * g->words_k + w) * g->size_i + i; }
 
-bool test_bit(const Grid* g, __global const ulong* field, int3 v) {
+INLINE bool test_bit(const Grid* g, __global const ulong* field, int3 v) {
   return (field[word_index(g, v.x, v.y, v.z >> 6)] >> (v.z & 63)) & 1;
 }
 
 // Bits [from, to) of a word; both are clamped to 0..64.
-ulong bit_run(int from, int to) {
+INLINE ulong bit_run(int from, int to) {
   from = clamp(from, 0, 64);
   to = clamp(to, 0, 64);
   if (from >= to) return 0;
@@ -45,19 +64,19 @@ ulong bit_run(int from, int to) {
   return below_to & ~((1ul << from) - 1);  // from < to <= 64, so the shift is defined
 }
 
-int lowest_bit(ulong bits) { return 63 - (int)clz(bits & -bits); }
+INLINE int lowest_bit(ulong bits) { return 63 - (int)clz(bits & -bits); }
 
-int highest_bit(ulong bits) { return 63 - (int)clz(bits); }
+INLINE int highest_bit(ulong bits) { return 63 - (int)clz(bits); }
 
 // Bits of the word's layers that exist; the last word may have fewer than 64.
-ulong valid_layers(const Grid* g, int w) { return bit_run(0, g->size_k - 64 * w); }
+INLINE ulong valid_layers(const Grid* g, int w) { return bit_run(0, g->size_k - 64 * w); }
 
-float3 transform_point(const Transform* T, float3 p) {
+INLINE float3 transform_point(const Transform* T, float3 p) {
   return (float3)(T->r00 * p.x + T->r01 * p.y + T->r02 * p.z + T->t0, T->r10 * p.x + T->r11 * p.y + T->r12 * p.z + T->t1,
                   T->r20 * p.x + T->r21 * p.y + T->r22 * p.z + T->t2);
 }
 
-float3 rotate(const Transform* T, float3 v) {
+INLINE float3 rotate(const Transform* T, float3 v) {
   return (float3)(T->r00 * v.x + T->r01 * v.y + T->r02 * v.z, T->r10 * v.x + T->r11 * v.y + T->r12 * v.z,
                   T->r20 * v.x + T->r21 * v.y + T->r22 * v.z);
 }

@@ -52,9 +52,9 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
 
 // Exact membership in the space that one view has seen (its pixel there is valid and lies deeper).
 //   depths: all views' images;  p: in the view's camera frame [m]
-bool view_knows(const View* view, __global const float* depths, float3 p) {
+INLINE bool view_knows(const View* view, __global const float* depths, float3 p) {
   if (!(p.z > 0.0f)) return false;
-  const float s = floor(p.x * view->fx / p.z + view->cx + 0.5f), t = floor(p.y * view->fy / p.z + view->cy + 0.5f);
+  const float s = p.x * view->fx / p.z + view->cx + 0.5f, t = p.y * view->fy / p.z + view->cy + 0.5f;
   if (!(s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height)) return false;
   return p.z < fabs(depths[view->first_pixel + (int)t * view->width + (int)s]);
 }

@@ -60,18 +60,18 @@ Report Mapper::integrate(const DepthFrame& frame) {
   report.in_view = stages.select_in_view();
   report.split = stages.split_surfels();
 
-  // Known space K~ from the surfels - 3.2, Algorithm 1, eq. (5)-(8)
+  // Removal - 3.4, eq. (12): decided now, done when the frame can no longer fail
+  stages.mark_removed();
+
+  // Candidates for creation - 3.5, eq. (13) - without those that a recent view knows
+  stages.find_candidates();
+  stages.settle_by_recent_views();
+
+  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8)
   stages.compute_sign_field();
   stages.compute_known_hull();
   stages.sweep_paths();
   stages.filter_median();
-
-  // Removal - 3.4, eq. (12)
-  stages.mark_removed();
-
-  // Candidates for creation - 3.5, eq. (13) - and what the recent views know of them
-  stages.find_candidates();
-  stages.settle_by_recent_views();
   stages.filter_candidates();
 
   // Psi_(n+1) = survivors u created - eq. (14)-(16)

@@ -49,6 +49,7 @@ Stages::Stages(Commands& commands, const Config& config, SurfelMap& map, RecentV
       occupied_voxels_(commands),
       candidates_(commands),
       hull_faces_(commands),
+      lines_(commands),
       in_view_bits_(commands),
       removed_bits_(commands),
       in_view_slots_(commands),
@@ -97,6 +98,7 @@ void Stages::allocate_grid() {
   candidates_.resize(words());
   events_.resize(3 * EVENT_PLANES * words());
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
+  lines_.resize(line_numbers());
   hull_faces_.resize(2 * (j * k + i * k + i * j));
   hull_.resize(2 * (j * w + i * w + i * j));
 }
@@ -121,23 +123,27 @@ std::size_t Stages::select_in_view() {
 std::size_t Stages::split_surfels() {
   const char* stage = "split";
   const auto count = static_cast<cl_uint>(in_view_);
+  place_surfels();
   split_offsets_.resize(in_view_ + 1);
-  commands_.run(stage, "count_splits", in_view_, kGroup, grid_, limits_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
-                in_view_slots_(), count, split_offsets_());
+  commands_.run(stage, "count_splits", in_view_, kGroup, grid_, limits_, view_surfels_(), count, split_offsets_());
   const std::uint32_t additional = scan(stage, split_offsets_, in_view_);
   if (additional > 0) {
     map_.reserve(additional);
     in_view_slots_.grow(in_view_ + additional, in_view_);
-    commands_.run(stage, "split", in_view_, kGroup, grid_, limits_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
+    commands_.run(stage, "split", in_view_, kGroup, grid_, limits_, view_surfels_(), map_.position_radius(), map_.normal_attributes(),
                   map_.changed(), frame_, in_view_slots_(), count, split_offsets_(), map_.free_list(), static_cast<cl_uint>(map_.free_slots()),
                   static_cast<cl_uint>(map_.slots()));
     map_.added(additional);
     in_view_ += additional;
+    place_surfels();
   }
-  view_surfels_.resize(in_view_);
-  commands_.run(stage, "place_surfels", in_view_, kGroup, grid_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
-                in_view_slots_(), static_cast<cl_uint>(in_view_), view_surfels_());
   return additional;
+}
+
+void Stages::place_surfels() {
+  view_surfels_.resize(in_view_);
+  commands_.run("split", "place_surfels", in_view_, kGroup, grid_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
+                in_view_slots_(), static_cast<cl_uint>(in_view_), view_surfels_());
 }
 
 void Stages::compute_sign_field() {
@@ -154,7 +160,7 @@ void Stages::compute_sign_field() {
   commands_.run(stage, "fill_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_cursor_(), tile_surfels_());
   view_surfels_.resize(1);
   const std::size_t group = commands_.device().is_cpu ? 1 : 64;
-  commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, view_surfels_(), tile_begin_(), tile_surfels_(), events_());
+  commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, lines_(), view_surfels_(), tile_begin_(), tile_surfels_(), events_());
 }
 
 void Stages::compute_known_hull() {
@@ -162,7 +168,7 @@ void Stages::compute_known_hull() {
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
   hull_faces_.fill(stage, 0xffffffffU, 2 * (j * k + i * k + i * j));
   commands_.run(stage, "project_hull", map_.slots(), kGroup, grid_, limits_, T_camera_world_, map_.position_radius(),
-                map_.normal_attributes(), static_cast<cl_uint>(map_.slots()), hull_faces_());
+                map_.normal_attributes(), static_cast<cl_uint>(map_.slots()), lines_(), hull_faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), grid_, hull_faces_(),
                 hull_());
@@ -171,9 +177,9 @@ void Stages::compute_known_hull() {
 void Stages::sweep_paths() {
   const char* stage = "sweeps";
   const std::size_t i = grid_.size_i, j = grid_.size_j, w = grid_.words_k;
-  commands_.run(stage, "sweep_i", j * w, kGroup, grid_, events_(), hull_(), known_());
-  commands_.run(stage, "sweep_j", i * w, kGroup, grid_, events_(), hull_(), known_());
-  commands_.run(stage, "sweep_k", i * j, kGroup, grid_, events_(), hull_(), known_());
+  commands_.run(stage, "sweep_i", j * w, kGroup, grid_, lines_(), events_(), hull_(), known_());
+  commands_.run(stage, "sweep_j", i * w, kGroup, grid_, lines_(), events_(), hull_(), known_());
+  commands_.run(stage, "sweep_k", i * j, kGroup, grid_, lines_(), events_(), hull_(), known_());
 }
 
 void Stages::filter_median() { commands_.run("median", "median", words(), kGroup, grid_, limits_, known_(), filtered_()); }
@@ -187,18 +193,20 @@ void Stages::mark_removed() {
 }
 
 void Stages::find_candidates() {
-  commands_.run("candidates", "find_candidates", words(), kGroup, grid_, observed_(), filtered_(), occupied_voxels_(), candidates_());
+  commands_.run("candidates", "find_candidates", words(), kGroup, grid_, observed_(), occupied_voxels_(), candidates_());
 }
 
 void Stages::settle_by_recent_views() {
+  const char* stage = "recent_views";
   const int count = views_.prepare();
-  if (count == 0) return;
-  commands_.run("recent_views", "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(),
-                candidates_());
+  if (count > 0)
+    commands_.run(stage, "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(), candidates_());
+  lines_.fill(stage, 0, line_numbers());
+  commands_.run(stage, "mark_lines", words(), kGroup, grid_, candidates_(), lines_());
 }
 
 void Stages::filter_candidates() {
-  commands_.run("creation", "filter_candidates", words(), kGroup, grid_, limits_, observed_(), candidates_());
+  commands_.run("creation", "filter_candidates", words(), kGroup, grid_, limits_, layer_depth_(), observed_(), filtered_(), candidates_());
 }
 
 std::size_t Stages::remove_surfels() {
@@ -215,7 +223,7 @@ std::size_t Stages::remove_surfels() {
 std::size_t Stages::create_surfels() {
   View own = view_;  // as the camera itself sees it
   own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
-  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, own, views_.views(), (cl_int)views_.count(), views_.depths(), observed_(), created_voxels_(),
+  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(), layer_depth_(), observed_(), created_voxels_(),
                 static_cast<cl_uint>(created_count_), map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_,
                 map_.free_list(), static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()), in_view_slots_(),
                 static_cast<cl_uint>(in_view_));

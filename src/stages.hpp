@@ -40,6 +40,10 @@ class Stages {
   friend class StagesProbe;  // tests read and write the fields between stages
 
   std::size_t words() const { return static_cast<std::size_t>(grid_.size_i) * grid_.size_j * grid_.words_k; }
+  std::size_t line_numbers() const {
+    return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k + static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
+  }
+  void place_surfels();
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level = 0);
@@ -68,7 +72,7 @@ class Stages {
 
   // Bit fields
   DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, occupied_voxels_, candidates_;
-  DeviceArray<cl_uint> hull_faces_;
+  DeviceArray<cl_uint> hull_faces_, lines_;
 
   // Surfels in view
   DeviceArray<cl_ulong> in_view_bits_, removed_bits_;

@@ -1,7 +1,7 @@
 // Median - paper eq. (8): K~(v) = 1 iff enough of the 27 voxels around v have K' = 1. Beyond the grid its border repeats.
 
 // A word's bits moved so that bit k holds what layer k + 1, k - 1 has.
-ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int w) {
+INLINE ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int w) {
   const ulong here = field[word_index(g, i, j, w)];
   const ulong carry = w + 1 < g->words_k ? field[word_index(g, i, j, w + 1)] << 63 : 0;
   const int last = g->size_k - 1 - 64 * w;  // bit of the grid's last layer
@@ -9,7 +9,7 @@ ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int 
   return (here >> 1) | carry | border;
 }
 
-ulong layer_below(const Grid* g, __global const ulong* field, int i, int j, int w) {
+INLINE ulong layer_below(const Grid* g, __global const ulong* field, int i, int j, int w) {
   const ulong here = field[word_index(g, i, j, w)];
   return (here << 1) | (w > 0 ? field[word_index(g, i, j, w - 1)] >> 63 : here & 1);
 }

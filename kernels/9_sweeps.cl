@@ -1,9 +1,11 @@
 // Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family.
 //
 // At each voxel, in this order: invalid or exit -> e = 0; K' |= e; enter (and not invalid) -> e = 1. Along i and j one word carries 64 paths.
-// events: bit fields [3][EVENT_PLANES] of 4_sign_field; hull: 5_known_hull.
+// events: bit fields [3][EVENT_PLANES] of 7_sign_field; hull: 8_known_hull; lines: 6_recent_views: paths without a bit there are not walked.
 
-ulong step_paths(ulong* e, ulong enter, ulong exit, ulong invalid) {
+INLINE bool is_needed(__global const uint* lines, int word) { return (lines[word] | lines[word + 1]) != 0; }
+
+INLINE ulong step_paths(ulong* e, ulong enter, ulong exit, ulong invalid) {
   *e &= ~(exit | invalid);
   const ulong known = *e;
   *e |= enter & ~invalid;
@@ -26,19 +28,20 @@ void sweep_words(__global const ulong* events, size_t plane, int first, int stri
 }
 
 // One work item a word (j, w) of the i faces. First of the three: it sets known, the others add to it.
-__kernel void sweep_i(const Grid g, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
   const int path = get_global_id(0);
-  if (path >= g.size_j * g.words_k) return;
+  if (path >= g.size_j * g.words_k || !is_needed(lines, 2 * path)) return;
   const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
   sweep_words(events, plane, path * g.size_i, 1, g.size_i, hull[hull_word_offset(&g, FACE_I_LOW) + path],
               hull[hull_word_offset(&g, FACE_I_HIGH) + path], known, true);
 }
 
 // One work item a word (i, w) of the j faces.
-__kernel void sweep_j(const Grid g, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
   const int path = get_global_id(0);
   if (path >= g.size_i * g.words_k) return;
   const int i = path % g.size_i, w = path / g.size_i;
+  if (!is_needed(lines, lines_j(&g, i, w))) return;
   const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
   sweep_words(events + EVENT_PLANES * plane, plane, word_index(&g, i, 0, w), g.size_i * g.words_k, g.size_j,
               hull[hull_word_offset(&g, FACE_J_LOW) + i * g.words_k + w], hull[hull_word_offset(&g, FACE_J_HIGH) + i * g.words_k + w], known,
@@ -46,7 +49,7 @@ __kernel void sweep_j(const Grid g, __global const ulong* events, __global const
 }
 
 // One path, up a word's bits: between events its state is a run.
-ulong walk_up(bool* e, ulong enter, ulong exit, ulong invalid) {
+INLINE ulong walk_up(bool* e, ulong enter, ulong exit, ulong invalid) {
   ulong known = 0;
   int from = 0;
   for (ulong left = enter | exit | invalid; left != 0; left &= left - 1) {
@@ -63,7 +66,7 @@ ulong walk_up(bool* e, ulong enter, ulong exit, ulong invalid) {
 }
 
 // The same, down.
-ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
+INLINE ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
   ulong known = 0, left = enter | exit | invalid;
   int to = 64;
   while (left != 0) {
@@ -81,10 +84,11 @@ ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
 }
 
 // One work item a path (i, j).
-__kernel void sweep_k(const Grid g, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
   const int path = get_global_id(0);
   if (path >= g.size_i * g.size_j) return;
   const int i = path % g.size_i, j = path / g.size_i;
+  if (lines[lines_k(&g, i, j)] == 0) return;
   const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
   __global const ulong* planes = events + 2 * EVENT_PLANES * plane;
 

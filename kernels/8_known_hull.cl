@@ -6,7 +6,7 @@
 
 #define HULL_EMPTY 0xffffffffu
 
-uint face_offset(const Grid* g, int face) {
+INLINE uint face_offset(const Grid* g, int face) {
   const uint face_i = g->size_j * g->size_k, face_j = g->size_i * g->size_k, face_k = g->size_i * g->size_j;
   switch (face) {
     case FACE_I_LOW: return 0;
@@ -18,52 +18,64 @@ uint face_offset(const Grid* g, int face) {
   }
 }
 
-// Enters a surfel into every cell of an ellipse in a face.
+// Enters a surfel into the cells of an ellipse in a face, those on paths to be walked (and their neighbours).
 //   center, axes: of the ellipse, in the face's coordinates (column, row);  width, height: cells of the face
-void stamp_face(__global uint* face, int width, int height, float2 center, float2 axes, float distance, bool known) {
+//   lines: of the face's first row;  along_k: columns are layers, a bit each, else a number each;  row_lines: from row to row
+INLINE void stamp_face(__global uint* face, int width, int height, float2 center, float2 axes, uint key, __global const uint* lines,
+                       bool along_k, int row_lines) {
   const float2 half_axes = fmax(axes, 0.5f);
-  const int2 low = max(convert_int2_rtp(center - half_axes), 0);
-  const int2 high = min(convert_int2_rtn(center + half_axes), (int2)(width - 1, height - 1));
-  const uint key = (as_uint(distance) & ~1u) | (known ? 1u : 0u);
-  for (int row = low.y; row <= high.y; ++row) {
-    for (int column = low.x; column <= high.x; ++column) {
-      const float2 d = ((float2)((float)column, (float)row) - center) / half_axes;
-      if (dot(d, d) > 1.0f) continue;
+  const int last_row = min(floor_int(center.y + half_axes.y), height - 1);
+  for (int row = max(ceil_int(center.y - half_axes.y), 0); row <= last_row; ++row) {
+    const float d = ((float)row - center.y) / half_axes.y;
+    const float half_width = half_axes.x * sqrt(fmax(1.0f - d * d, 0.0f));
+    const int last = min(floor_int(center.x + half_width), width - 1);
+    __global const uint* needed = lines + row * row_lines;
+    for (int column = max(ceil_int(center.x - half_width), 0); column <= last; ++column) {
+      if (along_k && needed[column >> 5] == 0) {
+        column |= 31;  // the whole word
+        continue;
+      }
+      if ((along_k ? (needed[column >> 5] >> (column & 31)) & 1 : needed[column]) == 0) continue;
       __global uint* cell = &face[row * width + column];
       if (key < *cell) atomic_min(cell, key);  // the look before saves most of the atomics
     }
   }
 }
 
-// Enters a surfel into the face that it is beyond along one family of paths.
-//   position, size: along that family;  entering: cosine between normal and paths;  low_face: number of the family's low face
-void project_along(const Grid* g, const Limits* limits, __global uint* faces, int low_face, float position, int size, float entering,
-                   float2 center, float2 axes, int width, int height) {
+// A surfel's key in the face that it is beyond along one family of paths; HULL_EMPTY if it is beyond neither.
+//   position, size: along that family;  entering: cosine between normal and paths
+INLINE uint face_key(float position, int size, float entering, float th_d) {
   const bool below = position < -0.5f;
-  if (!below && position < (float)size - 0.5f) return;
-  const bool known = below ? entering > limits->th_d : entering < -limits->th_d;
+  if (!below && position < (float)size - 0.5f) return HULL_EMPTY;
+  const bool known = below ? entering > th_d : entering < -th_d;
   const float distance = below ? -0.5f - position : position - ((float)size - 0.5f);
-  const float2 reach = known ? axes : axes * limits->hull_unknown_scale;
-  stamp_face(faces + face_offset(g, below ? low_face : low_face + 1), width, height, center, reach, distance, known);
+  return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
 }
 
 // One work item a slot: surfels beyond a face, and within its range in the other two coordinates (with their own reach as a margin), enter it.
-//   i/o faces: six images of keys, HULL_EMPTY before
+//   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
 __kernel void project_hull(const Grid g, const Limits limits, const Transform T_camera_world, __global const float4* position_radius,
-                           __global const float4* normal_attributes, const uint slots, __global uint* faces) {
+                           __global const float4* normal_attributes, const uint slots, __global const uint* lines, __global uint* faces) {
   const uint slot = get_global_id(0);
   if (slot >= slots || !is_alive(normal_attributes[slot])) return;
   const ViewSurfel s = place_in_view(&g, &T_camera_world, position_radius[slot], normal_attributes[slot], slot);
-  const float axis_i = s.reach * sqrt(fmax(1.0f - s.n_x * s.n_x, 0.0f));
-  const float axis_j = s.reach * sqrt(fmax(1.0f - s.n_y * s.n_y, 0.0f));
-  const float axis_k = s.reach * sqrt(fmax(1.0f - s.n_k * s.n_k, 0.0f));
-  project_along(&g, &limits, faces, FACE_I_LOW, s.i, g.size_i, s.n_x, (float2)(s.k, s.j), (float2)(axis_k, axis_j), g.size_k, g.size_j);
-  project_along(&g, &limits, faces, FACE_J_LOW, s.j, g.size_j, s.n_y, (float2)(s.k, s.i), (float2)(axis_k, axis_i), g.size_k, g.size_i);
-  project_along(&g, &limits, faces, FACE_K_LOW, s.k, g.size_k, s.n_k, (float2)(s.i, s.j), (float2)(axis_i, axis_j), g.size_i, g.size_j);
+  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d), key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d);
+  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d);
+  const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
+  const float unknown = limits.hull_unknown_scale;
+  if (key_i != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.i < 0.0f ? FACE_I_LOW : FACE_I_HIGH), g.size_k, g.size_j, (float2)(s.k, s.j),
+               axes.zy * (key_i & 1 ? 1.0f : unknown), key_i, lines + lines_i(&g, 0, 0), true, 2 * g.words_k);
+  if (key_j != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.j < 0.0f ? FACE_J_LOW : FACE_J_HIGH), g.size_k, g.size_i, (float2)(s.k, s.i),
+               axes.zx * (key_j & 1 ? 1.0f : unknown), key_j, lines + lines_j(&g, 0, 0), true, 2 * g.words_k);
+  if (key_k != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.k < 0.0f ? FACE_K_LOW : FACE_K_HIGH), g.size_i, g.size_j, (float2)(s.i, s.j),
+               axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
 }
 
 // Is the state of a cell known? Not if no surfel was met there or beside it.
-bool hull_cell(__global const uint* face, int width, int height, int column, int row) {
+INLINE bool hull_cell(__global const uint* face, int width, int height, int column, int row) {
   const uint key = face[row * width + column];
   if ((key & 1u) == 0 || key == HULL_EMPTY) return false;
   return !((column > 0 && face[row * width + column - 1] == HULL_EMPTY) ||
@@ -74,7 +86,7 @@ bool hull_cell(__global const uint* face, int width, int height, int column, int
 
 // Number of the first word of a face in the hull's bits: i faces [size_j][words_k], j faces [size_i][words_k], bits along k;
 // k faces [size_j][size_i], a word each.
-uint hull_word_offset(const Grid* g, int face) {
+INLINE uint hull_word_offset(const Grid* g, int face) {
   const uint face_i = g->size_j * g->words_k, face_j = g->size_i * g->words_k, face_k = g->size_i * g->size_j;
   switch (face) {
     case FACE_I_LOW: return 0;

@@ -1,9 +1,10 @@
-// Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones, neither known nor taken by a surfel.
+// Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones that no surfel has taken.
+// Whether they are known is asked of the recent views first, and of the surfels only where those leave it open.
 
 // One work item a word.
-//   in  observed: C~;  known: K~;  occupied_voxels: those of surviving surfels;   out candidates
-__kernel void find_candidates(const Grid g, __global const ulong* observed, __global const ulong* known,
-                              __global const ulong* occupied_voxels, __global ulong* candidates) {
+//   in  observed: C~;  occupied_voxels: those of surviving surfels;   out candidates
+__kernel void find_candidates(const Grid g, __global const ulong* observed, __global const ulong* occupied_voxels,
+                              __global ulong* candidates) {
   const int word = get_global_id(0);
   if (word >= g.size_i * g.size_j * g.words_k) return;
   const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
@@ -15,5 +16,5 @@ __kernel void find_candidates(const Grid g, __global const ulong* observed, __gl
   if (i + 1 < g.size_i) beside |= observed[word + 1];
   if (j > 0) beside |= observed[word_index(&g, i, j - 1, w)];
   if (j + 1 < g.size_j) beside |= observed[word_index(&g, i, j + 1, w)];
-  candidates[word] = beside & ~here & ~known[word] & ~occupied_voxels[word] & valid_layers(&g, w);
+  candidates[word] = beside & ~here & ~occupied_voxels[word] & valid_layers(&g, w);
 }
