@@ -32,6 +32,29 @@ __kernel void filter_candidates(const Grid g, const Limits limits, __global cons
   candidates[word] = kept;
 }
 
+// Normal of a new surfel: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
+// observed voxel nearest to it that does not.
+float3 surfel_normal(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth,
+                     __global const ulong* observed, int3 v) {
+  const float3 center = voxel_center(g, layer_depth, v);
+  const float reach = 1.75f * 0.8660254f * voxel_size(g, center.z);
+  const float3 mean = normalize(observed_direction(g, layer_depth, observed, v));
+  if (view_knows(view, depths, center + reach * mean)) return mean;
+  float3 best = mean;
+  float best_cosine = -1.0f;
+  for (int n = 0; n < 27; ++n) {
+    const int3 u = v + (int3)(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    if (!inside_grid(g, u) || !test_bit(g, observed, u)) continue;
+    const float3 direction = normalize(voxel_center(g, layer_depth, u) - center);
+    const float cosine = dot(direction, mean);
+    if (cosine > best_cosine && view_knows(view, depths, center + reach * direction)) {
+      best = direction;
+      best_cosine = cosine;
+    }
+  }
+  return best;
+}
+
 INLINE bool any_view_knows(__global const View* views, int view_count, __global const float* depths, float3 p) {
   for (int n = 0; n < view_count; ++n) {
     const View view = views[n];
@@ -60,9 +83,11 @@ float3 slide_to_boundary(const Grid* g, const View* view, __global const View* v
 }
 
 // One work item a new surfel.
-//   in  voxels[count]: 64 word + bit of each candidate;  view, depths: this frame's
+//   in  voxels[count]: 64 word + bit of each candidate;  slide: whether they leave their voxel's centre
+//       view: this frame's, views[view_count]: the kept ones, both in this frame's camera;  depths: their images
 //   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
-__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const View view, __global const View* views, const int view_count,
+__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const int slide, const View view,
+                             __global const View* views, const int view_count,
                              __global const float* depths, __global const float* layer_depth, __global const ulong* observed,
                              __global const uint* voxels, const uint count, __global float4* position_radius,
                              __global float4* normal_attributes, __global uint* changed, const uint frame, __global const uint* free_slots,
@@ -72,9 +97,9 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Transform 
   const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const int3 v = (int3)(i, j, 64 * w + voxels[n] % 64);
   const float3 p = voxel_center(&g, layer_depth, v);
-  const float3 normal = normalize(observed_direction(&g, layer_depth, observed, v));
+  const float3 normal = surfel_normal(&g, &view, depths, layer_depth, observed, v);
   const uint slot = new_slot(n, free_slots, free_count, slots);
-  const float3 placed = slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal);
+  const float3 placed = slide ? slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal) : p;
   position_radius[slot] = (float4)(transform_point(&T_world_camera, placed), limits.create_radius * voxel_size(&g, p.z));
   normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE));
   changed[slot] = frame;

@@ -24,6 +24,7 @@ INLINE uint face_offset(const Grid* g, int face) {
 INLINE void stamp_face(__global uint* face, int width, int height, float2 center, float2 axes, uint key, __global const uint* lines,
                        bool along_k, int row_lines) {
   const float2 half_axes = fmax(axes, 0.5f);
+  if (center.x + half_axes.x < 0.0f || center.x - half_axes.x > (float)(width - 1)) return;
   const int last_row = min(floor_int(center.y + half_axes.y), height - 1);
   for (int row = max(ceil_int(center.y - half_axes.y), 0); row <= last_row; ++row) {
     const float d = ((float)row - center.y) / half_axes.y;

@@ -35,9 +35,10 @@ struct Config {
   int recent_views = 100;
   double recent_view_distance = 0.005;
   double recent_view_angle = 0.4;
-  bool remove_buried = true;
 
-  // Labels (paper 3.5)
+  // Removal, creation and labels (paper 3.4, 3.5)
+  bool remove_buried = true;
+  bool slide_to_boundary = true;
   double surface_depth = 0.03;
 
   /// Every fault, one sentence each; empty when the configuration can be used.
@@ -83,6 +84,8 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.recent_view_distance);
   visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
   visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
+  visit(FieldInfo{"slide_to_boundary", "", "new surfels stand near the boundary within their voxel, not at its centre"},
+        config.slide_to_boundary);
   visit(FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1}, config.surface_depth);
 }
 
