@@ -43,6 +43,7 @@ namespace frontier_surfels {
 #define SURFEL_ALIVE (1u << 24)
 #define SURFEL_OCCUPIED (1u << 25)
 #define SURFEL_COLORED (1u << 26)
+#define SURFEL_RAGGED (1u << 27)  // known space is thin here: the normal finds it, but says nothing of the paths around
 
 // The non-uniform voxel grid of one view - paper 3.1, eq. (2)-(3).
 typedef struct {
@@ -80,7 +81,7 @@ typedef struct {
   float n_k;               // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
   float ray_x, ray_y;      // a step along k moves so many voxels in x and y
   SHARED_UINT slot;        // in the map
-  SHARED_UINT padding;
+  SHARED_UINT ragged;      // 1: opens no path to known space, only closes it
 } ViewSurfel;
 
 // Limits of the method, from the configuration.

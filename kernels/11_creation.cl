@@ -33,13 +33,14 @@ __kernel void filter_candidates(const Grid g, const Limits limits, __global cons
 }
 
 // Normal of a new surfel: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
-// observed voxel nearest to it that does not.
+// observed voxel nearest to it that does not, and the surfel is ragged.
 float3 surfel_normal(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth,
-                     __global const ulong* observed, int3 v) {
+                     __global const ulong* observed, int3 v, bool* ragged) {
   const float3 center = voxel_center(g, layer_depth, v);
   const float reach = 1.75f * 0.8660254f * voxel_size(g, center.z);
   const float3 mean = normalize(observed_direction(g, layer_depth, observed, v));
-  if (view_knows(view, depths, center + reach * mean)) return mean;
+  *ragged = !view_knows(view, depths, center + reach * mean);
+  if (!*ragged) return mean;
   float3 best = mean;
   float best_cosine = -1.0f;
   for (int n = 0; n < 27; ++n) {
@@ -97,11 +98,12 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Transform 
   const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const int3 v = (int3)(i, j, 64 * w + voxels[n] % 64);
   const float3 p = voxel_center(&g, layer_depth, v);
-  const float3 normal = surfel_normal(&g, &view, depths, layer_depth, observed, v);
+  bool ragged;
+  const float3 normal = surfel_normal(&g, &view, depths, layer_depth, observed, v, &ragged);
   const uint slot = new_slot(n, free_slots, free_count, slots);
   const float3 placed = slide ? slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal) : p;
   position_radius[slot] = (float4)(transform_point(&T_world_camera, placed), limits.create_radius * voxel_size(&g, p.z));
-  normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE));
+  normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE | (ragged ? SURFEL_RAGGED : 0)));
   changed[slot] = frame;
   in_view_slots[in_view + n] = slot;
 }

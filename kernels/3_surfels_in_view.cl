@@ -22,7 +22,7 @@ INLINE ViewSurfel place_in_view(const Grid* g, const Transform* T_camera_world, 
   s.ray_x = pyramid ? p.x / p.z : 0.0f;
   s.ray_y = pyramid ? p.y / p.z : 0.0f;
   s.slot = slot;
-  s.padding = 0;
+  s.ragged = (as_uint(normal_attributes.w) & SURFEL_RAGGED) != 0 ? 1 : 0;
   return s;
 }
 

@@ -3,6 +3,7 @@
 // For a voxel at offset u (locally metric voxel coordinates) from a surfel with normal n, reach rho and thickness t:
 //   e^2 = (u.n)^2 / t^2 + |u - (u.n) n|^2 / rho^2,  weight w = 1 - e where e < 1;  g_tau = <n, t_tau>
 //   |g_tau| > th_d: D_tau += sign(g_tau) w;   else, where e < 1 and |u - (u.n) n| < rho / 2: the voxel is invalid for family tau.
+// Ours: a ragged surfel (11_creation) makes voxels invalid for every family.
 // One work-group does one tile in local memory: integers, so the order of surfels and the number of work items do not matter.
 
 #ifndef SIGN_FIELD_GROUP
@@ -117,7 +118,7 @@ INLINE Footprint make_footprint(const Limits* limits, const ViewSurfel* s, int3 
   f.a = f.step_n * f.step_n * f.along + f.step_step * f.in_plane;
   f.core = 0.25f * s->reach * s->reach;
   const float3 g = (float3)(s->n_x, s->n_y, s->n_k);
-  f.sign = select((int3)(0), select((int3)(-1), (int3)(1), g > 0.0f), fabs(g) > limits->th_d);
+  f.sign = select((int3)(0), select((int3)(-1), (int3)(1), g > 0.0f), fabs(g) > limits->th_d && s->ragged == 0);
   f.extent = ellipsoid_extents(s, limits->thickness);
   f.layers = run_in_tile(ceil_int(f.center.z - f.extent.z), floor_int(f.center.z + f.extent.z));
   return f;

@@ -45,10 +45,10 @@ INLINE void stamp_face(__global uint* face, int width, int height, float2 center
 
 // A surfel's key in the face that it is beyond along one family of paths; HULL_EMPTY if it is beyond neither.
 //   position, size: along that family;  entering: cosine between normal and paths
-INLINE uint face_key(float position, int size, float entering, float th_d) {
+INLINE uint face_key(float position, int size, float entering, float th_d, bool ragged) {
   const bool below = position < -0.5f;
   if (!below && position < (float)size - 0.5f) return HULL_EMPTY;
-  const bool known = below ? entering > th_d : entering < -th_d;
+  const bool known = !ragged && (below ? entering > th_d : entering < -th_d);
   const float distance = below ? -0.5f - position : position - ((float)size - 0.5f);
   return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
 }
@@ -60,8 +60,8 @@ __kernel void project_hull(const Grid g, const Limits limits, const Transform T_
   const uint slot = get_global_id(0);
   if (slot >= slots || !is_alive(normal_attributes[slot])) return;
   const ViewSurfel s = place_in_view(&g, &T_camera_world, position_radius[slot], normal_attributes[slot], slot);
-  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d), key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d);
-  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d);
+  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d, s.ragged != 0), key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d, s.ragged != 0);
+  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d, s.ragged != 0);
   const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
   const float unknown = limits.hull_unknown_scale;
   if (key_i != HULL_EMPTY)
