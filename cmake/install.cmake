@@ -11,6 +11,7 @@ install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
 install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO}
   PATTERN replay EXCLUDE)  # belongs to the programs
 install(DIRECTORY config DESTINATION ${INSTALL_SHARE_TO})
+install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # the report's template
 file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)
 install(PROGRAMS ${PYTHON_SCRIPTS} DESTINATION ${INSTALL_PROGRAMS_TO})  # beside the programs that run them
 

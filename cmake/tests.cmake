@@ -6,14 +6,15 @@ find_package(GTest REQUIRED)
 # Recorded sequences that some tests need; they are skipped without.
 set(FRONTIER_SURFELS_DATA "${PROJECT_SOURCE_DIR}/../shared/data" CACHE PATH "folder of recorded sequences for the tests")
 
+set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
+file(MAKE_DIRECTORY ${POCL_CACHE})
+
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB ROS_TEST_SOURCES CONFIGURE_DEPENDS test/ros/test_*.cpp)
   list(APPEND TEST_SOURCES ${ROS_TEST_SOURCES})
 endif()
 
-set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
-file(MAKE_DIRECTORY ${POCL_CACHE})
 foreach(source ${TEST_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   set(target frontier_surfels_${name})  # in a workspace all packages share the names of targets
@@ -32,3 +33,8 @@ foreach(source ${TEST_SOURCES})
     endif()
   endif()
 endforeach()
+
+# The command line from outside. /usr/bin: the Python that has the modules of the report.
+add_test(NAME test_replay_score
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
+set_tests_properties(test_replay_score PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)

@@ -22,7 +22,7 @@ INLINE int floor_int(float x) {
 // F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.
 INLINE float3 to_grid(const Grid* g, float3 p) {
   if (p.z < g->z_min) {
-    return (float3)(p.x / g->delta_min + g->center_i, p.y / g->delta_min + g->center_j, p.z / g->delta_min + (float)g->padding_k);
+    return (float3)(p.x * g->fx / g->z_min + g->center_i, p.y * g->fy / g->z_min + g->center_j, p.z / g->delta_min + (float)g->padding_k);
   }
   return (float3)(p.x * g->fx / p.z + g->center_i, p.y * g->fy / p.z + g->center_j, g->f * log(p.z / g->z_min) + g->k_min);
 }
@@ -30,7 +30,7 @@ INLINE float3 to_grid(const Grid* g, float3 p) {
 // F^-1: grid coordinates -> camera frame [m].
 INLINE float3 from_grid(const Grid* g, float3 c) {
   if (c.z < g->k_min) {
-    return (float3)((c.x - g->center_i) * g->delta_min, (c.y - g->center_j) * g->delta_min, (c.z - (float)g->padding_k) * g->delta_min);
+    return (float3)((c.x - g->center_i) * g->z_min / g->fx, (c.y - g->center_j) * g->z_min / g->fy, (c.z - (float)g->padding_k) * g->delta_min);
   }
   const float z = g->z_min * exp((c.z - g->k_min) / g->f);
   return (float3)((c.x - g->center_i) * z / g->fx, (c.y - g->center_j) * z / g->fy, z);
@@ -40,7 +40,7 @@ INLINE float3 from_grid(const Grid* g, float3 c) {
 //   layer_depth[size_k]: z of each layer's centre [m]
 INLINE float3 voxel_center(const Grid* g, __global const float* layer_depth, int3 v) {
   const float z = layer_depth[v.z], dx = (float)v.x - g->center_i, dy = (float)v.y - g->center_j;
-  return (float)v.z < g->k_min ? (float3)(dx * g->delta_min, dy * g->delta_min, z) : (float3)(dx * z / g->fx, dy * z / g->fy, z);
+  return (float)v.z < g->k_min ? (float3)(dx * g->z_min / g->fx, dy * g->z_min / g->fy, z) : (float3)(dx * z / g->fx, dy * z / g->fy, z);
 }
 
 INLINE int3 voxel_of(float3 c) { return (int3)(floor_int(c.x + 0.5f), floor_int(c.y + 0.5f), floor_int(c.z + 0.5f)); }

@@ -45,7 +45,7 @@ INLINE bool may_reach_grid(const Grid* g, const Limits* limits, float3 p, float 
   if (p.z < -((float)g->padding_k + reach) * voxel || p.z > g->z_max + 2.0f * reach * voxel) return false;
   const bool pyramid = p.z >= g->z_min;
   const float ray_x = pyramid ? p.x / p.z : 0.0f, ray_y = pyramid ? p.y / p.z : 0.0f;
-  const float i = (pyramid ? ray_x * g->fx : p.x / voxel) + g->center_i, j = (pyramid ? ray_y * g->fy : p.y / voxel) + g->center_j;
+  const float i = (pyramid ? ray_x : p.x / g->z_min) * g->fx + g->center_i, j = (pyramid ? ray_y : p.y / g->z_min) * g->fy + g->center_j;
   const float reach_i = reach * (1.0f + fabs(ray_x)), reach_j = reach * (1.0f + fabs(ray_y));
   return i > -reach_i && i < (float)g->size_i + reach_i && j > -reach_j && j < (float)g->size_j + reach_j;
 }

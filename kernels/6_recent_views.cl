@@ -25,7 +25,7 @@ __kernel void settle_candidates(const Grid g, __global const View* views, const 
     if (open == 0) continue;
     const float2 c = (float2)((float)i - g.center_i, (float)j - g.center_j);
     const float3 direction = pyramid ? (float3)(c.x / g.fx, c.y / g.fy, 1.0f) : (float3)(0.0f, 0.0f, 1.0f);
-    const float3 base = pyramid ? (float3)(0.0f) : (float3)(c.x * g.delta_min, c.y * g.delta_min, 0.0f);
+    const float3 base = pyramid ? (float3)(0.0f) : (float3)(c.x * g.z_min / g.fx, c.y * g.z_min / g.fy, 0.0f);
     ulong settled = 0;
     for (int v = 0; v < view_count && open != 0; ++v) {
       const View view = views[v];

@@ -23,11 +23,27 @@ Config checked(const Config& config) {
   return config;
 }
 
+/// Runs a piece of work on the device; what OpenCL throws becomes one of this library's errors.
+template <typename Work>
+auto on_device(Work work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    throw_device_error(error);
+  }
+}
+
 }  // namespace
 
 struct Mapper::Impl {
+  Report integrate(const DepthFrame& frame);
+
   explicit Impl(const Config& wanted)
-      : config(checked(wanted)), commands(choose_device(config)), map(commands), views(commands, config), stages(commands, config, map, views) {}
+      : config(checked(wanted)),
+        commands(choose_device(config)),
+        map(commands),
+        views(commands, config),
+        stages(commands, config, map, views) {}
 
   Config config;
   Commands commands;
@@ -37,20 +53,23 @@ struct Mapper::Impl {
   std::uint64_t sequence = 0;
 };
 
-Mapper::Mapper(const Config& config) : impl_(std::make_unique<Impl>(config)) {}
+Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
 Mapper::~Mapper() = default;
 Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 Report Mapper::integrate(const DepthFrame& frame) {
+  return on_device([&] { return impl_->integrate(frame); });
+}
+
+Report Mapper::Impl::integrate(const DepthFrame& frame) {
   const auto start = Clock::now();
-  Stages& stages = impl_->stages;
   Report report;
   report.stamp = frame.stamp;
-  report.sequence = impl_->sequence + 1;
+  report.sequence = sequence + 1;
 
   // The working image and its grid - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(frame, impl_->config);
+  const WorkingImage image = make_working_image(frame, config);
   stages.begin_frame(image, frame.T_world_camera, static_cast<std::uint32_t>(report.sequence));
 
   // Observed space C~ - 3.3, eq. (9)-(11)
@@ -68,10 +87,14 @@ Report Mapper::integrate(const DepthFrame& frame) {
   stages.settle_by_recent_views();
 
   // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8)
-  stages.compute_sign_field();
-  stages.compute_known_hull();
-  stages.sweep_paths();
-  stages.filter_median();
+  if (stages.is_open()) {
+    stages.compute_sign_field();
+    stages.compute_known_hull();
+    stages.sweep_paths();
+    stages.filter_median();
+  } else {
+    stages.assume_unknown();
+  }
   stages.filter_candidates();
 
   // Psi_(n+1) = survivors u created - eq. (14)-(16)
@@ -81,15 +104,17 @@ Report Mapper::integrate(const DepthFrame& frame) {
   // Labels and colour - 3.5
   stages.label_surfels();
 
-  report.view_kept = impl_->views.keep_current();
-  report.stages = impl_->commands.take_times();
-  impl_->sequence = report.sequence;
-  report.surfels = impl_->map.size();
+  report.view_kept = views.keep_current();
+  report.stages = commands.take_times();
+  sequence = report.sequence;
+  report.surfels = map.size();
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
 
-std::vector<Surfel> Mapper::surfels() const { return impl_->map.download(); }
+std::vector<Surfel> Mapper::surfels() const {
+  return on_device([&] { return impl_->map.download(); });
+}
 
 std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const {
   std::vector<Surfel> inside;
@@ -99,7 +124,7 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 }
 
 Changes Mapper::changes(std::uint64_t since) const {
-  Changes changes = impl_->map.changes(since);
+  Changes changes = on_device([&] { return impl_->map.changes(since); });
   changes.sequence = impl_->sequence;
   return changes;
 }
@@ -107,14 +132,15 @@ Changes Mapper::changes(std::uint64_t since) const {
 void Mapper::save(const std::string& path) const { write_ply(path, surfels()); }
 
 void Mapper::load(const std::string& path) {
-  impl_->map.replace(read_ply(path), static_cast<std::uint32_t>(impl_->sequence + 1));
-  impl_->views.clear();
+  const std::vector<Surfel> surfels = read_ply(path);
+  on_device([&] { impl_->map.replace(surfels, static_cast<std::uint32_t>(impl_->sequence + 1)); });
+  impl_->views.clear(impl_->map.size() == 0);
   ++impl_->sequence;
 }
 
 void Mapper::reset() {
-  impl_->map.replace({}, static_cast<std::uint32_t>(impl_->sequence + 1));
-  impl_->views.clear();
+  on_device([&] { impl_->map.replace({}, static_cast<std::uint32_t>(impl_->sequence + 1)); });
+  impl_->views.clear(true);
   ++impl_->sequence;
 }
 

@@ -90,7 +90,7 @@ class Replacement {
   }
 
   void write(const void* data, std::size_t bytes) {
-    if (std::fwrite(data, 1, bytes, file_.get()) != bytes) fail();
+    if (bytes > 0 && std::fwrite(data, 1, bytes, file_.get()) != bytes) fail();  // an empty map's data may be null
   }
 
   void commit() {
@@ -164,9 +164,9 @@ std::vector<Surfel> read_ply(const std::string& path) {
                     " surfels, which its size does not fit.");
   }
   std::vector<Record> records(count);
-  if (std::fseek(file.get(), static_cast<long>(text.size()), SEEK_SET) != 0 ||
-      std::fread(records.data(), sizeof(Record), count, file.get()) != count) {
-    throw FileError("The map " + path + " cannot be read to its end: " + std::strerror(errno) + ".");
+  if (count > 0 && (std::fseek(file.get(), static_cast<long>(text.size()), SEEK_SET) != 0 ||
+                    std::fread(records.data(), sizeof(Record), count, file.get()) != count)) {
+    throw FileError("The map " + path + " cannot be read to its end: use another copy.");
   }
   if (checksum(records) != crc) throw FileError(path + " is damaged: its checksum does not fit its surfels; use another copy.");
   if (!std::all_of(records.begin(), records.end(), sound)) {

@@ -11,13 +11,18 @@ Transform to_transform(const Eigen::Isometry3d& T) {
 }
 
 RecentViews::RecentViews(Commands& commands, const Config& config)
-    : config_(config), views_(commands), depths_(commands), commands_(commands) {}
+    : config_(config), complete_(config.recent_views > 0), views_(commands), depths_(commands) {}
+
+void RecentViews::clear(bool map_is_empty) {
+  kept_.clear();
+  complete_ = map_is_empty && config_.recent_views > 0;
+}
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
   if (image.depth.size() > room_pixels_) {  // larger images than ever before: the kept ones are few and soon replaced
-    kept_.clear();
+    depths_.resize((config_.recent_views + 1) * image.depth.size());
+    clear(kept_.empty() && complete_);
     room_pixels_ = image.depth.size();
-    depths_.resize((config_.recent_views + 1) * room_pixels_);
   }
   std::vector<bool> taken(config_.recent_views + 1, false);
   for (const Kept& kept : kept_) taken[kept.room] = true;
@@ -60,7 +65,10 @@ bool RecentViews::adds_something() const {
 
 bool RecentViews::keep_current() {
   if (config_.recent_views == 0 || !adds_something()) return false;
-  if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) kept_.pop_back();
+  if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
+    kept_.pop_back();
+    complete_ = false;
+  }
   kept_.push_front(current_);
   return true;
 }

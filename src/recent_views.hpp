@@ -29,7 +29,11 @@ class RecentViews {
   /// Keeps the current view if it adds something. @return whether it did
   bool keep_current();
 
-  void clear() { kept_.clear(); }
+  /// Have all views ever kept since the map was empty been kept until now? Then they alone know what is known.
+  bool complete() const { return complete_; }
+
+  /// Forgets all views. @param map_is_empty  whether there is nothing that only they knew
+  void clear(bool map_is_empty);
 
   const cl::Buffer& views() const { return views_(); }
   const cl::Buffer& depths() const { return depths_(); }
@@ -48,9 +52,9 @@ class RecentViews {
   std::size_t room_pixels_ = 0;  ///< pixels of the largest image so far
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
+  bool complete_;
   DeviceArray<View> views_;
   DeviceArray<float> depths_;  ///< [recent_views + 1][room_pixels_]: the kept views' images and the current one's
-  Commands& commands_;
 };
 
 }  // namespace frontier_surfels

@@ -6,8 +6,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kGroup = 64;       // work items of a group, where kernels do not say otherwise
-constexpr std::size_t kScanFew = 2048;   // so many values one work item scans alone
+constexpr std::size_t kGroup = 64;      // work items of a group, where kernels do not say otherwise
+constexpr std::size_t kScanFew = 2048;  // so many values one work item scans alone
 
 Limits make_limits(const Config& config) {
   Limits limits = {};
@@ -131,8 +131,8 @@ std::size_t Stages::split_surfels() {
     map_.reserve(additional);
     in_view_slots_.grow(in_view_ + additional, in_view_);
     commands_.run(stage, "split", in_view_, kGroup, grid_, limits_, view_surfels_(), map_.position_radius(), map_.normal_attributes(),
-                  map_.changed(), frame_, in_view_slots_(), count, split_offsets_(), map_.free_list(), static_cast<cl_uint>(map_.free_slots()),
-                  static_cast<cl_uint>(map_.slots()));
+                  map_.changed(), frame_, in_view_slots_(), count, split_offsets_(), map_.free_list(),
+                  static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()));
     map_.added(additional);
     in_view_ += additional;
     place_surfels();
@@ -145,6 +145,8 @@ void Stages::place_surfels() {
   commands_.run("split", "place_surfels", in_view_, kGroup, grid_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
                 in_view_slots_(), static_cast<cl_uint>(in_view_), view_surfels_());
 }
+
+void Stages::assume_unknown() { filtered_.fill("median", 0, words()); }
 
 void Stages::compute_sign_field() {
   const char* stage = "sign_field";
@@ -160,7 +162,8 @@ void Stages::compute_sign_field() {
   commands_.run(stage, "fill_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_cursor_(), tile_surfels_());
   view_surfels_.resize(1);
   const std::size_t group = commands_.device().is_cpu ? 1 : 64;
-  commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, lines_(), view_surfels_(), tile_begin_(), tile_surfels_(), events_());
+  commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, lines_(), view_surfels_(), tile_begin_(), tile_surfels_(),
+                events_());
 }
 
 void Stages::compute_known_hull() {
@@ -188,8 +191,8 @@ void Stages::mark_removed() {
   const char* stage = "removal";
   occupied_voxels_.fill(stage, 0, words());
   removed_bits_.resize((in_view_ + 63) / 64 + 1);
-  commands_.run(stage, "mark_removed", in_view_, 64, grid_, view_, static_cast<cl_int>(config_.remove_buried), views_.depths(), view_surfels_(),
-                static_cast<cl_uint>(in_view_), map_.position_radius(), observed_(), occupied_voxels_(), removed_bits_());
+  commands_.run(stage, "mark_removed", in_view_, 64, grid_, view_, static_cast<cl_int>(config_.remove_buried), views_.depths(),
+                view_surfels_(), static_cast<cl_uint>(in_view_), map_.position_radius(), observed_(), occupied_voxels_(), removed_bits_());
 }
 
 void Stages::find_candidates() {
@@ -200,7 +203,9 @@ void Stages::settle_by_recent_views() {
   const char* stage = "recent_views";
   const int count = views_.prepare();
   if (count > 0)
-    commands_.run(stage, "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(), candidates_());
+    commands_.run(stage, "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(),
+                  candidates_());
+  if (!is_open()) return;
   lines_.fill(stage, 0, line_numbers());
   commands_.run(stage, "mark_lines", words(), kGroup, grid_, candidates_(), lines_());
 }
@@ -223,19 +228,20 @@ std::size_t Stages::remove_surfels() {
 std::size_t Stages::create_surfels() {
   View own = view_;  // as the camera itself sees it
   own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
-  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, static_cast<cl_int>(config_.slide_to_boundary), own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(), layer_depth_(), observed_(), created_voxels_(),
-                static_cast<cl_uint>(created_count_), map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_,
-                map_.free_list(), static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()), in_view_slots_(),
-                static_cast<cl_uint>(in_view_));
+  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_,
+                static_cast<cl_int>(config_.slide_to_boundary), own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(),
+                layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), map_.position_radius(),
+                map_.normal_attributes(), map_.changed(), frame_, map_.free_list(), static_cast<cl_uint>(map_.free_slots()),
+                static_cast<cl_uint>(map_.slots()), in_view_slots_(), static_cast<cl_uint>(in_view_));
   map_.added(created_count_);
   in_view_ += created_count_;
   return created_count_;
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, T_camera_world_, static_cast<float>(config_.surface_depth), depth_(), column_end_(), color_(),
-                static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.position_radius(),
-                map_.normal_attributes(), map_.changed(), frame_);
+  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, T_camera_world_, static_cast<float>(config_.surface_depth), depth_(),
+                column_end_(), color_(), static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_),
+                map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_);
 }
 
 std::uint32_t Stages::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {

@@ -21,19 +21,21 @@ class Stages {
   /// Sends a frame's image and, where the camera has changed, its grid. @param frame  number that changed surfels get
   void begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
 
-  void observe_space();             ///< C~
-  std::size_t select_in_view();     ///< @return surfels that touch the grid
-  std::size_t split_surfels();      ///< @return surfels that this adds to the map
-  void compute_sign_field();        ///< events of D
-  void compute_known_hull();        ///< states in which paths enter the grid
-  void sweep_paths();               ///< K'
-  void filter_median();             ///< K~
-  void mark_removed();              ///< surfels in observed space; nothing is removed yet
-  void find_candidates();           ///< voxels for new surfels by C~, K~ and the surfels that stay
-  void settle_by_recent_views();    ///< candidates that a kept view knows are dropped
-  void filter_candidates();         ///< candidates without a normal are dropped
-  std::size_t remove_surfels();     ///< @return how many; device memory for what create_surfels adds is made sure of before
-  std::size_t create_surfels();     ///< @return how many
+  void observe_space();                                ///< C~
+  std::size_t select_in_view();                        ///< @return surfels that touch the grid
+  std::size_t split_surfels();                         ///< @return surfels that this adds to the map
+  bool is_open() const { return !views_.complete(); }  ///< whether section 4 has anything left to decide
+  void assume_unknown();                               ///< K~ = 0: what the recent views did not see is unknown
+  void compute_sign_field();                           ///< events of D
+  void compute_known_hull();                           ///< states in which paths enter the grid
+  void sweep_paths();                                  ///< K'
+  void filter_median();                                ///< K~
+  void mark_removed();                                 ///< surfels in observed space; nothing is removed yet
+  void find_candidates();                              ///< voxels for new surfels by C~, K~ and the surfels that stay
+  void settle_by_recent_views();                       ///< candidates that a kept view knows are dropped
+  void filter_candidates();                            ///< candidates without a normal are dropped
+  std::size_t remove_surfels();  ///< @return how many; device memory for what create_surfels adds is made sure of before
+  std::size_t create_surfels();  ///< @return how many
   void label_surfels();
 
  private:
@@ -41,7 +43,8 @@ class Stages {
 
   std::size_t words() const { return static_cast<std::size_t>(grid_.size_i) * grid_.size_j * grid_.words_k; }
   std::size_t line_numbers() const {
-    return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k + static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
+    return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
+           static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
   void place_surfels();
   void set_grid(const WorkingImage& image);

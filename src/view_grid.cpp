@@ -6,12 +6,12 @@
 namespace frontier_surfels {
 namespace {
 
-/// Pixels (of `pixels`) whose sample of layer k lies in each of `size` voxels: s with round((s - c) (k - k_p) / focal + center) = voxel.
-void add_footprints(std::vector<PixelRange>& ranges, int size, int pixels, double c, double focal, double layers, double center) {
+/// Pixels (of `pixels`) whose sample of layer k lies in each of `size` voxels: s with round((s - c) (k - k_p) / f + center) = voxel.
+void add_footprints(std::vector<PixelRange>& ranges, int size, int pixels, double c, double f, double layers, double center) {
   const std::size_t first = ranges.size();
   ranges.resize(first + size, PixelRange{0, 0});
   for (int s = 0; s < pixels; ++s) {
-    const double voxel = std::floor((s - c) * layers / focal + center + 0.5);
+    const double voxel = std::floor((s - c) * layers / f + center + 0.5);
     if (voxel < 0 || voxel >= size) continue;
     PixelRange& range = ranges[first + static_cast<std::size_t>(voxel)];
     if (range[0] == range[1]) range[0] = static_cast<std::uint16_t>(s);
@@ -23,7 +23,7 @@ void add_footprints(std::vector<PixelRange>& ranges, int size, int pixels, doubl
 
 ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
   const double f = (camera.fx + camera.fy) / 2, k_min = config.padding_k + f;
-  const double size_k = std::floor(f * std::log(config.z_max / config.z_min) + k_min + 0.5) + 1;
+  const double size_k = std::ceil(f * std::log(config.z_max / config.z_min) + k_min) + 1;
   const double size_i = camera.width + 2 * config.padding_i, size_j = camera.height + 2 * config.padding_j;
   constexpr double kMostVoxels = 2e9;  // 32-bit numbers of voxels
   if (size_i * size_j * (size_k + 64) > kMostVoxels)
@@ -58,8 +58,8 @@ ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
   }
   for (int k = 0; k < g.first_pyramid_layer; ++k) {
     const double layers = k - config.padding_k;
-    add_footprints(view.pixels_i, g.size_i, k < config.padding_k ? 0 : g.width, camera.cx, camera.fx, layers, camera.cx + config.padding_i);
-    add_footprints(view.pixels_j, g.size_j, k < config.padding_k ? 0 : g.height, camera.cy, camera.fy, layers, camera.cy + config.padding_j);
+    add_footprints(view.pixels_i, g.size_i, k < config.padding_k ? 0 : g.width, camera.cx, f, layers, camera.cx + config.padding_i);
+    add_footprints(view.pixels_j, g.size_j, k < config.padding_k ? 0 : g.height, camera.cy, f, layers, camera.cy + config.padding_j);
   }
   return view;
 }

@@ -25,10 +25,13 @@ void check_depth(const DepthImage& image, const Config& config) {
 }
 
 void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
-  if (!(std::isfinite(k.fx) && std::isfinite(k.fy) && k.fx > 0 && k.fy > 0))
+  constexpr double kMost = 1e6, kLeast = 1e-3;  // [pixel]; beyond, floats overflow
+  if (!(k.fx >= kLeast && k.fy >= kLeast && std::isfinite(k.fx) && std::isfinite(k.fy)))
     throw BadFrame("The focal lengths " + std::to_string(k.fx) + ", " + std::to_string(k.fy) +
                    " must be positive: is the camera calibrated, and its camera_info published?");
-  if (!(std::isfinite(k.cx) && std::isfinite(k.cy))) throw BadFrame("The principal point of the camera is not a number.");
+  if (!(std::abs(k.cx) <= kMost && std::abs(k.cy) <= kMost))
+    throw BadFrame("The principal point " + std::to_string(k.cx) + ", " + std::to_string(k.cy) +
+                   " of the camera is not a number, or nowhere near the image: is its camera_info right?");
   if (k.width != image.width || k.height != image.height)
     throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +
                    size_text(image.width, image.height) + ".");

@@ -86,7 +86,9 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
   visit(FieldInfo{"slide_to_boundary", "", "new surfels stand near the boundary within their voxel, not at its centre"},
         config.slide_to_boundary);
-  visit(FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1}, config.surface_depth);
+  visit(
+      FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1},
+      config.surface_depth);
 }
 
 /// Reads a flat YAML map of fields over the defaults. Values out of range are left to problems().

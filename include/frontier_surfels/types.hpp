@@ -71,7 +71,7 @@ struct ColorImage {
 struct DepthFrame {
   double stamp = 0;  ///< [s]
   DepthImage depth;
-  Intrinsics intrinsics;                                                    ///< of `depth`, rectified
+  Intrinsics intrinsics;                                                                          ///< of `depth`, rectified
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
   std::optional<ColorImage> color;
 };
@@ -93,9 +93,9 @@ struct Surfel {
 
 /// Difference between the map after frame `since` and now.
 struct Changes {
-  std::uint64_t sequence = 0;           ///< number of the last frame (or reset, load) contained
-  std::vector<Surfel> updated;          ///< new or changed surfels
-  std::vector<std::uint32_t> removed;   ///< ids that are no longer in the map
+  std::uint64_t sequence = 0;          ///< number of the last frame (or reset, load) contained
+  std::vector<Surfel> updated;         ///< new or changed surfels
+  std::vector<std::uint32_t> removed;  ///< ids that are no longer in the map
 };
 
 /// Wall or device time of one stage of the pipeline.
@@ -112,9 +112,9 @@ struct Report {
   std::size_t in_view = 0;     ///< surfels that touched the view's grid
   std::size_t created = 0;
   std::size_t removed = 0;
-  std::size_t split = 0;        ///< surfels that were replaced by smaller ones
-  bool view_kept = false;       ///< the frame entered the recent views
-  double total_ms = 0;          ///< wall time of integrate()
+  std::size_t split = 0;          ///< surfels that splitting has added: surfels = those before + split + created - removed
+  bool view_kept = false;         ///< the frame entered the recent views
+  double total_ms = 0;            ///< wall time of integrate()
   std::vector<StageTime> stages;  ///< in the order of the paper; device time by OpenCL events
 };
 

@@ -14,4 +14,8 @@ std::string opencl_error_name(cl_int code);
 /// The sentence for a failed call.
 DeviceError device_error(const cl::Error& error);
 
+/// Throws device_error() for an error of OpenCL's, and any other as it is. Call it while the error is being handled.
+/// Takes the base class so that callers need not know of OpenCL.
+[[noreturn]] void throw_device_error(const std::exception& error);
+
 }  // namespace frontier_surfels

@@ -1,0 +1,215 @@
+#!/usr/bin/python3
+"""Makes DIR/report.html, one self-contained page, of the files that replay_score has written to DIR."""
+import base64
+import io
+import json
+import os
+import sys
+
+try:
+    import jinja2
+    import matplotlib.image
+    import numpy
+except ImportError as error:
+    sys.exit(f'replay_report: {error.name} is missing: install python3-jinja2, python3-matplotlib and python3-numpy.')
+
+HERE = os.path.dirname(os.path.realpath(__file__))
+sys.path.insert(0, HERE)
+import report_plots  # noqa: E402
+import surfel_pictures  # noqa: E402
+
+# In the source tree; installed from lib/frontier_surfels, or from bin
+TEMPLATE_FOLDERS = [os.path.join(HERE, folder) for folder in ('../share', '../../share/frontier_surfels', '../share/frontier_surfels')]
+NONE = '–'
+
+# What is known here of the paper's own figures: one core of an i7-7700, and a GTX 1070; 160 x 120 pixels.
+PAPER_FRAME_CPU = '1130–1770'  # [ms]
+PAPER_FRAME_GPU = '83.5'  # [ms]
+PAPER_STAGES = {'sweeps': ('243', '4.9'), 'median': ('224', '2.0')}  # [ms]
+PAPER_BYTES_PER_SURFEL = '38–43'
+PAPER_MAP_MB = '90'
+PAPER_SURFELS = '2.4'  # [million]
+
+
+def percent(share):
+    """A share as text, with as many digits as say something."""
+    if share is None:
+        return NONE
+    value = 100 * share
+    digits = 1 if value >= 10 else 2 if value >= 0.1 or value == 0 else 3
+    return f'{value:.{digits}f} %'
+
+
+def number(value, digits=3):
+    """With so many significant digits, and thin spaces between thousands."""
+    if value is None:
+        return NONE
+    if isinstance(value, int) or abs(value) >= 10 ** (digits - 1):
+        return f'{value:,.0f}'.replace(',', '\u202f')
+    return f'{value:#.{digits}g}'.rstrip('.')
+
+
+def read_json(path):
+    with open(path, encoding='utf-8') as file:
+        return json.load(file)
+
+
+def read_frames(path):
+    return numpy.atleast_1d(numpy.genfromtxt(path, delimiter=',', names=True, deletechars=''))
+
+
+def headlines(summary):
+    """(figure, name, what it means) of what a reader wants to know first."""
+    surfels, time = summary['surfels'], summary['time_ms']
+    rate = f"{number(1000 / time['median'])} frames a second. " if time['median'] else ''
+    result = [
+        (number(surfels['total']), 'surfels', f"{number(surfels['occupied'])} on measured surfaces, {number(surfels['frontier'])} where "
+         'empty space ends at the unknown.'),
+        (f"{number(time['median'])} ms", 'a frame (median)', f"{rate}The map's boundary is up to date after each of them.")]
+    if 'exact' in summary:
+        exact = summary['exact']
+        result += [
+            (percent(exact['right']), 'right', 'of the surfels: a quarter of a radius behind is unknown, and just before it is known, '
+             'judged by the frames themselves.'),
+            (percent(exact['miss_2cm']), 'missed', 'of the true boundary: no surfel within 2 cm.')]
+    if 'octomap' in summary:
+        octomap = summary['octomap']
+        ratio = octomap['time_ms']['median'] / time['median'] if time['median'] else None
+        result.append((f'{number(ratio)} ×', 'as fast as OctoMap', f"with voxels of {1000 * octomap['resolution']:g} mm on the same "
+                       'frames, the median of each; OctoMap without the search for its boundary.'))
+    return result
+
+
+def accuracy_rows(summary):
+    octomap = summary.get('octomap')
+    if octomap is None:
+        return []
+    return [('Surfels of the map, |Ψ|', number(summary['surfels']['total'])),
+            ("Boundary of OctoMap, |M|", number(octomap['surfels'])),
+            ('False surfels: no M within 5 cm', number(octomap['fp'])),
+            ('Missing surfels: no Ψ within 5 cm', number(octomap['fn'])),
+            ('FDR: false, of Ψ', percent(octomap['fdr'])),
+            ('FOR: missing, of M', percent(octomap['for']))]
+
+
+def time_rows(summary):
+    """(what, this map, OctoMap, paper CPU, paper GPU) [ms]"""
+    time, octomap = summary['time_ms'], summary.get('octomap', {}).get('time_ms', {})
+    names = [('mean', 'Mean'), ('median', 'Median'), ('p95', '95 % are below'), ('max', 'Largest')]
+    rows = [(text, number(time[key]), number(octomap.get(key)), NONE, NONE) for key, text in names]
+    return rows + [('Relative standard deviation', f"{time['rsd_percent']:.1f} %", NONE, NONE, NONE),
+                   ('As the paper tells it', NONE, NONE, PAPER_FRAME_CPU, PAPER_FRAME_GPU)]
+
+
+def stage_rows(summary):
+    """(stage, mean, median, share of the mean, paper CPU, paper GPU) [ms]"""
+    time = summary['time_ms']
+    rows = []
+    for name, stage in time['stages'].items():
+        share = percent(stage['mean'] / time['mean'] if time['mean'] else None)
+        rows.append((name.replace('_', ' '), number(stage['mean']), number(stage['median']), share, *PAPER_STAGES.get(name, (NONE, NONE))))
+    rest = time['mean'] - sum(stage['mean'] for stage in time['stages'].values())
+    return rows + [('outside the stages', number(rest), NONE, percent(rest / time['mean'] if time['mean'] else None), NONE, NONE)]
+
+
+def memory_rows(summary, bytes_per_surfel):
+    surfels, memory = summary['surfels'], summary['memory_mb']
+    rows = [('Bytes a surfel', number(bytes_per_surfel), PAPER_BYTES_PER_SURFEL),
+            ('Surfels [million]', number(surfels['total'] / 1e6), PAPER_SURFELS),
+            ('Map [MB]', number(surfels['map_bytes'] / 1e6), PAPER_MAP_MB),
+            ('Device, the map included [MB]', number(memory['device']), NONE),
+            ('Process at its largest, yardsticks included [MB]', number(memory['peak_rss']), NONE)]
+    if 'octomap' in summary:
+        rows.append((f"OctoMap of {1000 * summary['octomap']['resolution']:g} mm [MB]", number(summary['octomap']['memory_mb']), NONE))
+    return rows
+
+
+def exact_rows(summary):
+    names = [('right', 'Right: unknown behind, known before it'), ('buried', 'Buried: known on both sides'),
+             ('floating', 'Floating: unknown on both sides'), ('flipped', 'Flipped: known only behind'),
+             ('within_1v', 'Boundary at most 1 voxel away along the normal'),
+             ('within_2v', 'Boundary at most 2 voxels away along the normal'),
+             ('fdr_2cm', 'Boundary further than 2 cm away along the normal'),
+             ('fdr_5cm', 'Boundary further than 5 cm away along the normal'),
+             ('miss_1cm', 'No surfel within 1 cm'), ('miss_2cm', 'No surfel within 2 cm'), ('miss_5cm', 'No surfel within 5 cm'),
+             ('label_ok', 'Of those with one within 2 cm: its label is right')]
+    return [(text, percent(summary['exact'][key])) for key, text in names] if 'exact' in summary else []
+
+
+def embedded(mime, data):
+    return f'data:{mime};base64,' + base64.b64encode(data).decode('ascii')
+
+
+def png(picture):
+    file = io.BytesIO()
+    matplotlib.image.imsave(file, picture.clip(0, 1), format='png')
+    return embedded('image/png', file.getvalue())
+
+
+def pictures(folder):
+    """(caption, image) of the map from outside and inside, and of OctoMap's boundary likewise."""
+    trajectory = numpy.loadtxt(os.path.join(folder, 'trajectory.txt'), ndmin=2)
+    positions, rotations = trajectory[:, 1:4], surfel_pictures.rotations_of(trajectory[:, 4:8])
+    path = surfel_pictures.splats_of_path(positions)
+    verdicts = os.path.join(folder, 'verdicts.bin')
+    wrong = numpy.fromfile(verdicts, dtype=numpy.uint8) != 0 if os.path.exists(verdicts) else None
+    result, outside, inside = [], None, surfel_pictures.inside_camera(positions, rotations)
+    for name, title, marked in [('surfels.ply', 'The map', wrong), ('octomap.ply', "OctoMap's boundary", None)]:
+        file = os.path.join(folder, name)
+        vertices = surfel_pictures.read_ply(file) if os.path.exists(file) else []
+        if len(vertices) == 0:
+            continue
+        splats = surfel_pictures.splats_of(vertices, marked)
+        outside = outside or surfel_pictures.outside_camera(rotations, splats.position)
+        red = '; red: errors of the exact test' if marked is not None else ''
+        result += [(f'{title} from outside; walls that turn their back are left out, orange: the path of the camera{red}.',
+                    png(surfel_pictures.render(surfel_pictures.joined(splats, path), outside))),
+                   (f'{title} from inside, a little behind where the camera was in the middle of the recording{red}.',
+                    png(surfel_pictures.render(splats, inside)))]
+    return result
+
+
+def sweep_plot(folder, summary):
+    path = os.path.join(folder, 'sweep.json')
+    sweep = read_json(path) if os.path.exists(path) else {}
+    if not sweep.get('values'):
+        return None
+    plot = report_plots.sweep(sweep, summary['config'].get(sweep['parameter']))
+    return {'parameter': sweep['parameter'], 'plot': embedded('image/svg+xml', plot)}
+
+
+def page(folder):
+    summary = read_json(os.path.join(folder, 'summary.json'))
+    frames = read_frames(os.path.join(folder, 'frames.csv'))
+    surfels = summary['surfels']
+    bytes_per_surfel = surfels['map_bytes'] / surfels['total'] if surfels['total'] else 0
+    loader = jinja2.FileSystemLoader(TEMPLATE_FOLDERS)
+    environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, autoescape=True, trim_blocks=True,
+                                     lstrip_blocks=True)
+    template = environment.get_template('report.html.j2')
+    return template.render(
+        name=os.path.basename(os.path.normpath(summary['input']['path'])), summary=summary, headlines=headlines(summary),
+        accuracy=accuracy_rows(summary), times=time_rows(summary), stages=stage_rows(summary),
+        memory=memory_rows(summary, bytes_per_surfel), exact=exact_rows(summary), pictures=pictures(folder),
+        sweep=sweep_plot(folder, summary),
+        time_plot=embedded('image/svg+xml', report_plots.time_per_frame(frames, list(summary['time_ms']['stages']))),
+        map_plot=embedded('image/svg+xml', report_plots.map_per_frame(frames, bytes_per_surfel)))
+
+
+def main():
+    if len(sys.argv) != 2 or sys.argv[1].startswith('-'):
+        print('usage: replay_report.py DIR\n' + __doc__, file=sys.stderr)
+        return 2
+    folder = sys.argv[1]
+    try:
+        html = page(folder)
+        with open(os.path.join(folder, 'report.html'), 'w', encoding='utf-8') as file:
+            file.write(html)
+    except (OSError, ValueError, KeyError, jinja2.TemplateError) as error:
+        print(f"replay_report: the report of '{folder}' could not be made: {type(error).__name__}: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,68 @@
+/// Recordings of ROS: bags, read without a master.
+#pragma once
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bag_messages.hpp"
+#include "bag_topics.hpp"
+#include "bag_transforms.hpp"
+#include "frontier_surfels/replay/frame_source.hpp"
+#include "selection.hpp"
+
+namespace frontier_surfels::replay {
+
+/// Images of one topic in the order of the bag. Only the few around the last stamp asked for are kept in memory.
+class ImageWindow {
+ public:
+  ImageWindow(const rosbag::Bag& bag, const std::string& topic);
+
+  /// The image nearest to `stamp`; empty if none is within the tolerance. Stamps must not decrease from call to call.
+  ImageMessage nearest(const ros::Time& stamp);
+
+ private:
+  rosbag::View view_;
+  rosbag::View::iterator next_;
+  std::deque<ImageMessage> window_;
+};
+
+/// Reads all transforms and cameras when it is opened, images one by one afterwards.
+class BagSource : public FrameSource {
+ public:
+  BagSource(const std::string& path, const SourceOptions& options);
+
+  std::size_t size() const override { return selection_.count; }
+  std::optional<RecordedFrame> next() override;
+  const std::vector<std::string>& skipped() const override { return skipped_; }
+  const std::vector<std::string>& notes() const override { return notes_; }
+
+ private:
+  void open(const std::string& path);
+  void read_transforms_and_cameras();
+  void choose_world(const std::string& wanted);
+  RecordedFrame read(const rosbag::MessageInstance& message);
+  Intrinsics intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const;
+  cv::Mat color_at(const ros::Time& stamp, const cv::Size& depth_size);
+  void note_once(const std::string& sentence);
+
+  rosbag::Bag bag_;
+  BagTopics topics_;
+  BagTransforms transforms_;
+  std::vector<std::pair<ros::Time, sensor_msgs::CameraInfo>> cameras_;  ///< by stamp; only where it changes
+  std::string world_;
+  std::unique_ptr<rosbag::View> depth_view_;
+  rosbag::View::iterator next_depth_;
+  std::unique_ptr<ImageWindow> color_images_;
+  Selection selection_;
+  std::size_t done_ = 0;  ///< of the selection
+  std::vector<std::string> skipped_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace frontier_surfels::replay

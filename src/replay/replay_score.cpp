@@ -1,0 +1,216 @@
+/// replay_score: maps a recording, scores the map, and writes a report.
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <optional>
+
+#include "frontier_surfels/ply.hpp"
+#include "replay/report_page.hpp"
+#include "replay/run.hpp"
+#include "replay/summary.hpp"
+#include "replay/sweep.hpp"
+
+namespace frontier_surfels::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+/// The command line, checked.
+struct Options {
+  Recording recording;
+  std::string report;  ///< folder
+  Config config;
+  double octomap_resolution = 0.01;  ///< [m]; 0: off
+  bool exact = true;
+  bool live = false;
+  std::optional<Sweep> sweep;
+};
+
+/// The command line as text; what needs the configuration is read from it afterwards.
+struct RawOptions {
+  std::string config_file;
+  std::vector<std::string> settings;
+  std::optional<int> threads;
+  std::string sweep;
+  bool no_exact = false;
+};
+
+volatile sig_atomic_t interrupted = 0;
+
+bool stop_requested() { return interrupted != 0; }
+
+/// The first Ctrl-C asks the run to stop after its frame; the second ends the program at once.
+void catch_first_interrupt() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  action.sa_flags = SA_RESETHAND | SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+}
+
+void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
+  SourceOptions& source = options.recording.options;
+  app.add_option("INPUT", options.recording.path, "a bag, or a folder (TUM RGB-D layout, or depth/ + poses.txt + camera.txt)")->required();
+  app.add_option("--report", options.report, "folder for the report; made if it is missing")->required()->type_name("DIR");
+  app.add_option("--config", raw.config_file, "parameters of the mapper")->type_name("FILE.yaml");
+  app.add_option("--set", raw.settings, "one parameter of the mapper; can be given again and again")
+      ->type_name("key=value")
+      ->allow_extra_args(false);
+  app.add_option("--first", source.first, "index of the first frame")->type_name("N")->check(CLI::NonNegativeNumber);
+  app.add_option("--last", source.last, "index of the last frame; -1: the end")->type_name("N")->check(CLI::Range(-1, INT32_MAX));
+  app.add_option("--stride", source.stride, "every so many frames")->type_name("N")->check(CLI::PositiveNumber);
+  app.add_option("--depth-topic", source.depth_topic, "bags: topic of the depth images")->type_name("T");
+  app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's info")->type_name("T");
+  app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
+  app.add_option("--world-frame", source.world_frame, "bags: tf frame of the map")->type_name("F");
+  app.add_option("--octomap-resolution", options.octomap_resolution, "voxel of the OctoMap beside [m], 0.01 unless given; 0: none")
+      ->type_name("M");
+  app.add_flag("--no-exact", raw.no_exact, "leave the exact test out");
+  app.add_option("--threads", raw.threads, "threads of the mapper and the scorers; 0: all")->type_name("N")->check(CLI::NonNegativeNumber);
+  app.add_option("--sweep", raw.sweep, "repeat the run over N values of a parameter")->type_name("PARAM=LO:HI:N");
+  app.add_flag("--live", options.live, "replay into a running mapper through its topics");
+  app.add_flag_callback(
+      "--parameters",
+      [] {
+        std::cout << parameter_table();
+        throw CLI::Success();
+      },
+      "print all parameters of the mapper");
+}
+
+/// @throws CLI::ValidationError with every fault of the settings and the configuration
+void read_config(const RawOptions& raw, Config& config) {
+  if (!raw.config_file.empty()) config = load_config(raw.config_file);
+  std::string problems;
+  for (const std::string& setting : raw.settings) {
+    const auto equals = setting.find('=');
+    try {
+      if (equals == std::string::npos) throw Error("--set '" + setting + "' is not of the form key=value.");
+      set_field(config, setting.substr(0, equals), setting.substr(equals + 1));
+    } catch (const Error& error) {
+      problems += std::string(error.what()) + "\n";
+    }
+  }
+  if (raw.threads) config.threads = *raw.threads;
+  for (const std::string& problem : config.problems()) problems += problem + "\n";
+  if (!problems.empty()) throw CLI::ValidationError("", problems);
+}
+
+/// @throws CLI::Error (also for help, with exit code 0), Error
+Options parse(int argc, char** argv) {
+  Options options;
+  RawOptions raw;
+  CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
+               "replay_score");
+  declare_options(app, options, raw);
+  try {
+    app.parse(argc, argv);
+    const int last = options.recording.options.last;
+    if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
+    // The upper bound catches millimetres, the lower one more voxels than fit any memory; NaN fails both.
+    const double resolution = options.octomap_resolution;
+    if (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10))
+      throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
+    read_config(raw, options.config);
+    options.exact = !raw.no_exact;
+    if (!raw.sweep.empty()) try {
+        options.sweep = parse_sweep(raw.sweep, options.config);
+      } catch (const Error& error) {
+        throw CLI::ValidationError("", error.what());
+      }
+  } catch (const CLI::CallForHelp&) {
+    std::cout << app.help();
+    throw;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
+    throw;
+  }
+  return options;
+}
+
+/// Makes the folder, proves that it can be written before hours are spent, and removes what an earlier run may have left there.
+void prepare_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const fs::path probe = folder / "summary.json";
+  if (!fs::is_directory(folder) || !std::ofstream(probe)) {
+    throw FileError("The report's folder '" + folder.string() + "' cannot be made or written: choose another with --report.");
+  }
+  for (const char* name :
+       {"summary.json", "frames.csv", "trajectory.txt", "surfels.ply", "octomap.ply", "verdicts.bin", "sweep.json", "report.html"}) {
+    fs::remove(folder / name, error);
+  }
+}
+
+/// What is known before scoring: a second Ctrl-C leaves at least that.
+void write_map(const fs::path& folder, const Run& run) {
+  write_ply(folder / "surfels.ply", run.surfels);
+  write_file(folder / "frames.csv", frames_csv(run.frames));
+  write_file(folder / "trajectory.txt", trajectory_text(run.frames));
+}
+
+void write_scores(const fs::path& folder, const Yardsticks& yardsticks, const Scores& scores, const nlohmann::ordered_json& summary) {
+  if (scores.octomap) write_ply(folder / "octomap.ply", yardsticks.octomap_boundary());
+  if (scores.exact)
+    write_file(folder / "verdicts.bin", std::string(reinterpret_cast<const char*>(scores.verdicts.data()), scores.verdicts.size()));
+  write_file(folder / "summary.json", summary.dump(2) + "\n");
+}
+
+/// Many frames are often passed over for one and the same reason, so the first few say it.
+void tell_skipped(const std::vector<std::string>& skipped) {
+  constexpr std::size_t kShown = 5;
+  for (std::size_t i = 0; i < std::min(skipped.size(), kShown); ++i) std::cerr << "Skipped a frame: " << skipped[i] << "\n";
+  if (skipped.size() > kShown) std::cerr << "... and " << skipped.size() - kShown << " more.\n";
+}
+
+void replay_and_score(const Options& options) {
+  if (options.live) throw Error("--live is not available yet: leave it out to replay offline.");
+  const fs::path folder = options.report;
+  catch_first_interrupt();
+  prepare_folder(folder);
+
+  Yardsticks yardsticks(options.config, options.octomap_resolution, options.exact);
+  const Run run = map_recording(options.recording, options.config, &yardsticks, stop_requested);
+  tell_skipped(run.skipped);
+  if (run.stopped) std::cerr << "Stopped after " << run.frames.size() << " frames: these are scored and written. Once more ends at once.\n";
+  write_map(folder, run);
+
+  const Scores scores = score(run.surfels, yardsticks, options.config.threads);
+  const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
+  write_scores(folder, yardsticks, scores, summary);
+  std::cout << result_table(summary) << std::flush;
+
+  if (options.sweep && !run.stopped) {
+    const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
+    write_file(folder / "sweep.json", sweep.dump(2) + "\n");
+  }
+  make_report_page(folder);
+  std::cout << "report      " << (folder / "report.html").string() << "\n";
+}
+
+}  // namespace
+}  // namespace frontier_surfels::replay
+
+int main(int argc, char** argv) {
+  using namespace frontier_surfels::replay;
+  try {
+    replay_and_score(parse(argc, argv));
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return kDone;
+    std::cerr << "replay_score: " << error.what() << "\n";
+    return kWrongUsage;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "replay_score: out of memory: leave the OctoMap out (--octomap-resolution 0) or replay fewer frames (--last, --stride).\n";
+  } catch (const std::exception& error) {
+    std::cerr << "replay_score: " << error.what() << "\n";
+  }
+  return kFailed;
+}

@@ -1,0 +1,94 @@
+#include "replay/run.hpp"
+
+#include <sys/resource.h>
+
+#include "frontier_surfels/mapper.hpp"
+#include "replay/progress.hpp"
+
+namespace frontier_surfels::replay {
+namespace {
+
+constexpr std::size_t kSegments = 40000;  // of the exact test's completeness: standard error below 0.25 % of any share
+
+/// [10^6 byte]; Linux gives KiB.
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss * 1024.0 / 1e6;
+}
+
+Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped) {
+  if (skipped.empty()) return Error("'" + recording.path + "' has no frame in the chosen part: check --first, --last and --stride.");
+  return Error("No frame of '" + recording.path + "' could be used; " + std::to_string(skipped.size()) +
+               " skipped, the first because: " + skipped.front());
+}
+
+}  // namespace
+
+Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
+  if (exact) exact_.emplace(config.z_min, config.z_max, config.decimation);
+  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config.z_min, config.z_max, config.decimation);
+}
+
+std::optional<double> Yardsticks::add(const DepthFrame& frame) {
+  if (exact_) exact_->add(frame);
+  if (!octomap_) return std::nullopt;
+  return octomap_->add(frame);
+}
+
+const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
+  if (!octomap_boundary_) octomap_boundary_ = octomap_->boundary();
+  return *octomap_boundary_;
+}
+
+bool Yardsticks::fit(const Config& config) const {
+  return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
+}
+
+Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
+  const auto source = open_source(recording.path, recording.options);
+  Mapper mapper(config);
+  Run run;
+  run.config = config;
+  run.device = mapper.device();
+
+  Progress progress("Mapping", static_cast<double>(source->size()), "frames");
+  while (const auto frame = source->next()) {
+    const DepthFrame view = frame->view();
+    try {
+      FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
+      if (yardsticks != nullptr) record.octomap_ms = yardsticks->add(view);
+      run.frames.push_back(std::move(record));
+    } catch (const BadFrame& refused) {
+      run.skipped.push_back(refused.what());
+    }
+    progress.update(static_cast<double>(run.frames.size() + run.skipped.size() + source->skipped().size()));
+    if (stop()) {
+      run.stopped = true;
+      break;
+    }
+  }
+  run.skipped.insert(run.skipped.end(), source->skipped().begin(), source->skipped().end());
+  if (run.frames.empty()) throw nothing_usable(recording, run.skipped);
+
+  run.surfels = mapper.surfels();
+  run.statistics = mapper.statistics();
+  run.peak_rss_mb = peak_rss_mb();
+  return run;
+}
+
+Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads) {
+  Scores scores;
+  if (yardsticks.octomap()) scores.octomap = yardsticks.octomap()->score(surfels, yardsticks.octomap_boundary());
+  if (yardsticks.exact()) {
+    Progress progress("Scoring", 1);
+    const auto show = [&progress](double share) {
+      progress.update(share);
+      return true;
+    };
+    scores.exact = yardsticks.exact()->score(surfels, kSegments, threads, show, &scores.verdicts);
+  }
+  return scores;
+}
+
+}  // namespace frontier_surfels::replay

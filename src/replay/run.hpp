@@ -1,0 +1,81 @@
+/// One run over a recording: source -> Mapper -> scores.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frontier_surfels/config.hpp"
+#include "frontier_surfels/replay/frame_source.hpp"
+#include "frontier_surfels/scoring/exact_test.hpp"
+#include "frontier_surfels/scoring/octomap_truth.hpp"
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels::replay {
+
+/// What is replayed.
+struct Recording {
+  std::string path;
+  SourceOptions options;
+};
+
+/// What a map is measured against; filled with the same frames as the map.
+class Yardsticks {
+ public:
+  /// @param octomap_resolution  [m]; 0: no OctoMap
+  Yardsticks(const Config& config, double octomap_resolution, bool exact);
+
+  /// @return OctoMap's wall time for the frame [ms], where there is one
+  std::optional<double> add(const DepthFrame& frame);
+
+  const std::optional<scoring::ExactTest>& exact() const { return exact_; }
+  const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }
+
+  /// OctoMap's boundary surfels M; computed once, after the last frame.
+  const std::vector<Surfel>& octomap_boundary() const;
+
+  /// Whether a map made with `config` can be measured against these: same depth range, same pixels.
+  bool fit(const Config& config) const;
+
+ private:
+  Config config_;
+  std::optional<scoring::ExactTest> exact_;
+  std::optional<scoring::OctomapTruth> octomap_;
+  mutable std::optional<std::vector<Surfel>> octomap_boundary_;
+};
+
+struct FrameRecord {
+  Report report;
+  Eigen::Isometry3d T_world_camera;
+  std::optional<double> octomap_ms;
+};
+
+/// What mapping a recording gave.
+struct Run {
+  Config config;
+  std::string device;
+  std::vector<FrameRecord> frames;
+  std::vector<std::string> skipped;  ///< why frames were not used: a sentence each
+  std::vector<Surfel> surfels;
+  Statistics statistics;
+  double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
+  bool stopped = false;    ///< before the recording's end
+};
+
+/// Maps a recording frame by frame.
+/// @param yardsticks  if not null: filled with the frames that the mapper took
+/// @param stop        asked after every frame whether to leave the rest
+/// @throws Error      also when not one frame could be used
+Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop);
+
+/// Scores of a map; empty where there is no such yardstick.
+struct Scores {
+  std::optional<scoring::OctomapScore> octomap;
+  std::optional<scoring::ExactScore> exact;
+  std::vector<scoring::Verdict> verdicts;  ///< of the exact test: one per surfel
+};
+
+Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads);
+
+}  // namespace frontier_surfels::replay

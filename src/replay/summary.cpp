@@ -1,0 +1,199 @@
+#include "replay/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <numeric>
+
+namespace frontier_surfels::replay {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::size_t kWarmUpFrames = 5;
+constexpr std::size_t kFewFrames = 10;
+
+/// The shortest text that reads back as the same number, whatever the locale.
+std::string exact_text(double value) { return ordered_json(value).dump(); }
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return (*middle + *std::max_element(values.begin(), middle)) / 2;
+}
+
+double mean(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0) / values.size(); }
+
+ordered_json mean_and_median(const std::vector<double>& values) { return {{"mean", mean(values)}, {"median", median(values)}}; }
+
+template <typename Getter>
+std::vector<double> column(const std::vector<FrameRecord>& frames, Getter get) {
+  std::vector<double> values(frames.size());
+  std::transform(frames.begin(), frames.end(), values.begin(), get);
+  return values;
+}
+
+/// 0 for a stage that did not run in this frame.
+double stage_ms(const FrameRecord& frame, const std::string& name) {
+  double ms = 0;
+  for (const StageTime& stage : frame.report.stages) {
+    if (stage.name == name) ms += stage.ms;
+  }
+  return ms;
+}
+
+double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
+
+double octomap_ms(const FrameRecord& frame) { return frame.octomap_ms.value_or(0); }
+
+ordered_json time_json(const std::vector<FrameRecord>& frames, const std::vector<std::string>& names) {
+  const TimeStatistics total = time_statistics(column(frames, total_ms));
+  ordered_json stages = ordered_json::object();
+  for (const std::string& name : names) {
+    stages[name] = mean_and_median(column(frames, [&name](const FrameRecord& frame) { return stage_ms(frame, name); }));
+  }
+  return {{"mean", total.mean}, {"median", total.median},           {"p95", total.p95},
+          {"max", total.max},   {"rsd_percent", total.rsd_percent}, {"stages", stages}};
+}
+
+std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
+  char text[200];
+  std::snprintf(text, sizeof(text), format, a, b, c, d);
+  return text;
+}
+
+}  // namespace
+
+TimeStatistics time_statistics(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  TimeStatistics result;
+  result.mean = mean(values);
+  result.median = median(values);
+  result.p95 = values[(95 * n + 99) / 100 - 1];
+  result.max = values.back();
+  double squares = 0;
+  for (const double value : values) squares += (value - result.mean) * (value - result.mean);
+  if (n > 1 && result.mean > 0) result.rsd_percent = 100 * std::sqrt(squares / (n - 1)) / result.mean;
+  return result;
+}
+
+std::vector<FrameRecord> warm_frames(const std::vector<FrameRecord>& frames) {
+  return {frames.begin() + (frames.size() > kFewFrames ? kWarmUpFrames : 0), frames.end()};
+}
+
+std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames) {
+  std::vector<std::string> names;
+  for (const FrameRecord& frame : frames) {
+    auto next = names.begin();  // where a stage not seen so far belongs: behind the one before it in this frame
+    for (const StageTime& stage : frame.report.stages) {
+      const auto found = std::find(names.begin(), names.end(), stage.name);
+      next = (found != names.end() ? found : names.insert(next, stage.name)) + 1;
+    }
+  }
+  return names;
+}
+
+ordered_json config_json(const Config& config) {
+  ordered_json json;
+  for_each_field(config, [&json](const FieldInfo& info, const auto& value) { json[info.name] = value; });
+  return json;
+}
+
+ordered_json octomap_json(const scoring::OctomapScore& score) {
+  return {{"surfels", score.surfels}, {"fp", score.fp}, {"fn", score.fn}, {"fdr", score.fdr}, {"for", score.for_}};
+}
+
+ordered_json exact_json(const scoring::ExactScore& score) {
+  return {{"right", score.right},         {"buried", score.buried},       {"floating", score.floating}, {"flipped", score.flipped},
+          {"within_1v", score.within_1v}, {"within_2v", score.within_2v}, {"fdr_2cm", score.fdr_2cm},   {"fdr_5cm", score.fdr_5cm},
+          {"miss_1cm", score.miss_1cm},   {"miss_2cm", score.miss_2cm},   {"miss_5cm", score.miss_5cm}, {"label_ok", score.label_ok}};
+}
+
+ordered_json summary_json(const Recording& recording, double octomap_resolution, const Run& run, const Yardsticks& yardsticks,
+                          const Scores& scores) {
+  const std::vector<FrameRecord> warm = warm_frames(run.frames);
+  ordered_json json;
+  json["input"] = {{"path", recording.path}, {"frames", run.frames.size()}, {"skipped", run.skipped.size()}};
+  json["config"] = config_json(run.config);
+  json["device"] = run.device;
+  json["surfels"] = {{"total", run.statistics.surfels},
+                     {"occupied", run.statistics.occupied},
+                     {"frontier", run.statistics.frontier},
+                     {"map_bytes", run.statistics.map_bytes}};
+  json["time_ms"] = time_json(warm, stage_names(run.frames));
+  json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
+  if (scores.octomap) {
+    json["octomap"] = {{"resolution", octomap_resolution},
+                       {"time_ms", mean_and_median(column(warm, octomap_ms))},
+                       {"memory_mb", yardsticks.octomap()->memory_mb()}};
+    json["octomap"].update(octomap_json(*scores.octomap));
+  }
+  if (scores.exact) json["exact"] = exact_json(*scores.exact);
+  return json;
+}
+
+std::string frames_csv(const std::vector<FrameRecord>& frames) {
+  const std::vector<std::string> stages = stage_names(frames);
+  const bool octomap = !frames.empty() && frames.front().octomap_ms.has_value();
+  std::string csv = "stamp,surfels,created,removed,";
+  for (const std::string& name : stages) csv += name + ",";
+  csv += octomap ? "total,octomap_ms\n" : "total\n";
+  for (const FrameRecord& frame : frames) {
+    const Report& report = frame.report;
+    csv += exact_text(report.stamp) + "," + std::to_string(report.surfels) + "," + std::to_string(report.created) + "," +
+           std::to_string(report.removed) + ",";
+    for (const std::string& name : stages) csv += exact_text(stage_ms(frame, name)) + ",";
+    csv += exact_text(report.total_ms);
+    if (octomap) csv += "," + exact_text(octomap_ms(frame));
+    csv += "\n";
+  }
+  return csv;
+}
+
+std::string trajectory_text(const std::vector<FrameRecord>& frames) {
+  std::string text = "# stamp tx ty tz qx qy qz qw (camera to world, optical frame)\n";
+  for (const FrameRecord& frame : frames) {
+    text += exact_text(frame.report.stamp);
+    const Eigen::Quaterniond q(frame.T_world_camera.linear());
+    const Eigen::Vector3d p = frame.T_world_camera.translation();
+    for (const double value : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) text += " " + exact_text(value);
+    text += "\n";
+  }
+  return text;
+}
+
+std::string result_table(const ordered_json& summary) {
+  const auto& input = summary["input"];
+  const auto& surfels = summary["surfels"];
+  const auto& time = summary["time_ms"];
+  std::string table;
+  table += formatted("frames      %.0f, %.0f skipped\n", input["frames"], input["skipped"]);
+  table += formatted("surfels     %.0f: %.0f occupied, %.0f frontier; %.1f MB\n", surfels["total"], surfels["occupied"],
+                     surfels["frontier"], surfels["map_bytes"].get<double>() / 1e6);
+  table +=
+      formatted("time        median %.1f ms a frame, 95 %% below %.1f ms, at most %.1f ms\n", time["median"], time["p95"], time["max"]);
+  const auto percent = [](const ordered_json& share) { return 100 * share.get<double>(); };
+  if (summary.contains("exact")) {
+    const auto& exact = summary["exact"];
+    table += formatted("exact test  right %.2f %%; more than 2 cm off %.2f %%; boundary missed by 2 cm %.2f %%; label right %.2f %%\n",
+                       percent(exact["right"]), percent(exact["fdr_2cm"]), percent(exact["miss_2cm"]), percent(exact["label_ok"]));
+  }
+  if (summary.contains("octomap")) {
+    const auto& octomap = summary["octomap"];
+    table += formatted("OctoMap     median %.1f ms a frame, %.1f MB; FDR %.2f %%, FOR %.2f %% at 5 cm\n", octomap["time_ms"]["median"],
+                       octomap["memory_mb"], percent(octomap["fdr"]), percent(octomap["for"]));
+  }
+  return table;
+}
+
+void write_file(const std::string& path, const std::string& content) {
+  std::ofstream file(path, std::ios::binary);
+  file << content;
+  file.close();
+  if (!file) throw FileError("'" + path + "' could not be written: check that the folder is writable and the disk not full.");
+}
+
+}  // namespace frontier_surfels::replay

@@ -1,0 +1,156 @@
+#include "frontier_surfels/scoring/octomap_truth.hpp"
+
+#include <octomap/octomap.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "decimated_depth.hpp"
+#include "surfel_tree.hpp"
+
+namespace frontier_surfels::scoring {
+
+namespace {
+
+using octomap::OcTree;
+using octomap::OcTreeKey;
+
+constexpr int kTreeDepth = 16;
+constexpr int kKeys = 1 << kTreeDepth;  ///< along an axis
+
+/// A voxel of the finest level.
+using Voxel = std::array<int, 3>;
+
+/// The node that holds a voxel, null if it is unknown.
+const octomap::OcTreeNode* find(const OcTree& tree, const Voxel& voxel) {
+  for (const int k : voxel) {
+    if (k < 0 || k >= kKeys) return nullptr;
+  }
+  return tree.search(OcTreeKey(voxel[0], voxel[1], voxel[2]));
+}
+
+/// An unknown voxel beside a known one, as a number: sorted by voxel, and the last of equal voxels tells of any occupied neighbour.
+std::uint64_t pack(const Voxel& v, bool beside_occupied) {
+  const auto key = [&](int axis) { return static_cast<std::uint64_t>(v[axis]); };
+  return (key(0) << 32 | key(1) << 16 | key(2)) << 1 | (beside_occupied ? 1 : 0);
+}
+
+Voxel unpack(std::uint64_t packed) {
+  const auto key = [&](int shift) { return static_cast<int>(packed >> shift & (kKeys - 1)); };
+  return {key(33), key(17), key(1)};
+}
+
+/// Appends the unknown voxels that touch a face of a leaf. A leaf may be a pruned one, a cube of many voxels.
+void unknown_beside(const OcTree& tree, const Voxel& low, int size, bool occupied, std::vector<std::uint64_t>& unknown) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int side : {low[axis] - 1, low[axis] + size}) {
+      if (side < 0 || side >= kKeys) continue;
+      Voxel v;
+      v[axis] = side;
+      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+      for (v[a] = low[a]; v[a] < low[a] + size; ++v[a]) {
+        for (v[b] = low[b]; v[b] < low[b] + size; ++v[b]) {
+          if (!find(tree, v)) unknown.push_back(pack(v, occupied));
+        }
+      }
+    }
+  }
+}
+
+/// Into known space. Where the known neighbours are opposite each other there is no such direction: then the z axis, as good as any.
+Eigen::Vector3f normal_at(const OcTree& tree, const Voxel& v) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      for (int k = -1; k <= 1; ++k) {
+        if ((i || j || k) && find(tree, {v[0] + i, v[1] + j, v[2] + k})) sum += Eigen::Vector3d(i, j, k).normalized();
+      }
+    }
+  }
+  return sum.norm() < 1e-6 ? Eigen::Vector3f::UnitZ() : sum.normalized().cast<float>().eval();
+}
+
+std::size_t count_far(const std::vector<Surfel>& surfels, const SurfelTree& tree, double tolerance) {
+  return std::count_if(surfels.begin(), surfels.end(),
+                       [&](const Surfel& surfel) { return tree.nearest(surfel.position.cast<double>()).distance > tolerance; });
+}
+
+}  // namespace
+
+struct OctomapTruth::Impl {
+  OcTree tree;
+  DepthRange range;
+};
+
+OctomapTruth::OctomapTruth(double resolution, double z_min, double z_max, int decimation) {
+  if (!(resolution > 0 && std::isfinite(resolution))) {
+    throw Error("The resolution of the OctoMap must be above 0, but is " + std::to_string(resolution) + " m.");
+  }
+  const DepthRange range{z_min, z_max, decimation};
+  range.check();
+  impl_.reset(new Impl{OcTree(resolution), range});
+}
+
+OctomapTruth::~OctomapTruth() = default;
+
+double OctomapTruth::add(const DepthFrame& frame) {
+  const DecimatedDepth decimated = decimate(frame, impl_->range);
+  const Intrinsics& camera = decimated.intrinsics;
+  octomap::Pointcloud cloud;
+  for (int t = 0; t < camera.height; ++t) {
+    for (int s = 0; s < camera.width; ++s) {
+      const double z = decimated.depth[static_cast<std::size_t>(t) * camera.width + s];
+      if (!(z > 0)) continue;
+      const Eigen::Vector3d p = frame.T_world_camera * Eigen::Vector3d((s - camera.cx) * z / camera.fx, (t - camera.cy) * z / camera.fy, z);
+      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    }
+  }
+  const Eigen::Vector3f origin = frame.T_world_camera.translation().cast<float>();
+
+  const auto start = std::chrono::steady_clock::now();
+  // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is pruned at once, as
+  // octomap_server does.
+  impl_->tree.insertPointCloud(cloud, octomap::point3d(origin.x(), origin.y(), origin.z()), -1, false, false);
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::vector<Surfel> OctomapTruth::boundary() const {
+  const OcTree& tree = impl_->tree;
+  std::vector<std::uint64_t> unknown;
+  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+    const OcTreeKey low = leaf.getIndexKey();
+    unknown_beside(tree, {low[0], low[1], low[2]}, 1 << (kTreeDepth - leaf.getDepth()), tree.isNodeOccupied(*leaf), unknown);
+  }
+  std::sort(unknown.begin(), unknown.end());
+
+  std::vector<Surfel> surfels;
+  for (std::size_t i = 0; i < unknown.size(); ++i) {
+    if (i + 1 < unknown.size() && unknown[i] >> 1 == unknown[i + 1] >> 1) continue;
+    const Voxel v = unpack(unknown[i]);
+    Surfel surfel;
+    for (int axis = 0; axis < 3; ++axis)
+      surfel.position[axis] = static_cast<float>(tree.keyToCoord(static_cast<octomap::key_type>(v[axis])));
+    surfel.normal = normal_at(tree, v);
+    surfel.radius = static_cast<float>(std::sqrt(3.0) / 2 * tree.getResolution());
+    surfel.label = unknown[i] & 1 ? Label::kOccupied : Label::kFrontier;
+    surfel.id = static_cast<std::uint32_t>(surfels.size());
+    surfels.push_back(surfel);
+  }
+  return surfels;
+}
+
+OctomapScore OctomapTruth::score(const std::vector<Surfel>& psi, const std::vector<Surfel>& m, double tolerance) const {
+  OctomapScore score;
+  score.surfels = m.size();
+  score.fp = count_far(psi, SurfelTree(m), tolerance);
+  score.fn = count_far(m, SurfelTree(psi), tolerance);
+  score.fdr = psi.empty() ? 0 : static_cast<double>(score.fp) / psi.size();
+  score.for_ = m.empty() ? 0 : static_cast<double>(score.fn) / m.size();
+  return score;
+}
+
+double OctomapTruth::memory_mb() const { return impl_->tree.memoryUsage() / 1e6; }
+
+}  // namespace frontier_surfels::scoring

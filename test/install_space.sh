@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Installs a build and uses what was installed, from another folder: the programs, and the library in somebody else's project.
+# Usage: install_space.sh BUILD, a build folder whose CMAKE_INSTALL_PREFIX may be overwritten
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+build=$(cd "$1" && pwd)
+
+fail() {
+  echo "install_space: $*" >&2
+  exit 1
+}
+cached() { sed -n "s/^$1:[A-Z]*=//p" "$build/CMakeCache.txt"; }
+
+prefix=$(cached CMAKE_INSTALL_PREFIX)
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder"
+
+rm -rf "$prefix"
+cmake --install "$build" >install.log
+if [ -e "$prefix/.catkin" ]; then
+  programs=$prefix/lib/frontier_surfels
+  if cmake --install "$build" --prefix "$folder/other" >other.log 2>&1; then fail "another prefix than the configured one was not refused"; fi
+  grep -q "the prefix must be known when configuring" other.log || fail "another prefix was refused without a sentence: $(cat other.log)"
+  [ ! -e other ] || fail "a refused installation left files behind"
+else
+  programs=$prefix/bin
+  mv "$prefix" "$prefix.moved"  # the programs must not depend on where they are
+  trap 'rm -rf "$folder" "$prefix.moved"' EXIT
+  prefix=$prefix.moved
+  programs=$prefix/bin
+fi
+for file in share/frontier_surfels/config/mapper.yaml share/frontier_surfels/config/paper.yaml include/frontier_surfels/mapper.hpp; do
+  [ -f "$prefix/$file" ] || fail "$file is not installed"
+done
+
+"$programs/make_synthetic" room --frames 4
+"$programs/replay_score" room --config "$prefix/share/frontier_surfels/config/paper.yaml" --report report --octomap-resolution 0.05
+/usr/bin/python3 - <<'PYTHON'
+import json
+summary = json.load(open("report/summary.json"))
+assert summary["input"]["frames"] == 4, summary["input"]
+assert summary["surfels"]["total"] > 1000, summary["surfels"]
+assert open("report/report.html").read().rstrip().endswith("</html>")
+PYTHON
+
+# consumer NAME PREFIX_PATH [OPTION...]
+consumer() {
+  cmake -S "$here/consumer" -B "$1" -DCMAKE_PREFIX_PATH="$2" -DCMAKE_BUILD_TYPE=Release "${@:3}" >"$1.log" 2>&1 &&
+    cmake --build "$1" >>"$1.log" 2>&1 || fail "a project that uses the library does not build: $(tail -20 "$1.log")"
+  program=$(find "$1" -type f -name consumer -perm -u=x -print -quit)
+  [ -n "$(ldd "$program" | grep -F "$2")" ] || fail "the project was linked with another library than that of $2"
+  "$program" "$1.ply" || fail "a project that uses the library does not run right ($1)"
+}
+consumer plain "$prefix"
+if [ -e "$prefix/.catkin" ]; then
+  consumer catkin "$prefix" -DTHROUGH_CATKIN=ON
+  consumer devel "$build/devel"
+fi
+echo "The install space works."

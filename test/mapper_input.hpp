@@ -1,0 +1,152 @@
+/// Frames, scores and comparisons for the tests of the whole mapper.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/replay/synthetic_room.hpp"
+#include "frontier_surfels/scoring/exact_test.hpp"
+
+namespace frontier_surfels {
+
+using Frames = std::vector<replay::RecordedFrame>;
+
+/// The default mapper for images that come at its working resolution already: rendering fewer pixels is what makes these tests quick.
+inline Config undecimated() {
+  Config config;
+  config.decimation = 1;
+  return config;
+}
+
+/// The room's camera after decimation by 4 (and by 8).
+inline Intrinsics working_camera() { return replay::synthetic_camera(160, 120); }
+inline Intrinsics coarse_camera() { return replay::synthetic_camera(80, 60); }
+
+/// fx = fy, the principal point in the middle.
+inline Intrinsics plain_camera(int width, int height, double focal_length) {
+  return {focal_length, focal_length, (width - 1) / 2.0, (height - 1) / 2.0, width, height};
+}
+
+/// The camera at `eye` looks along `forward` (not vertical), its x axis level; z is up.
+inline Eigen::Isometry3d look_along(const Eigen::Vector3d& eye, const Eigen::Vector3d& forward) {
+  const Eigen::Vector3d z = forward.normalized(), x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
+  Eigen::Matrix3d R;
+  R << x, z.cross(x), z;
+  return Eigen::Translation3d(eye) * Eigen::Quaterniond(R);
+}
+
+inline replay::RecordedFrame plane_frame(const Intrinsics& camera, double depth,
+                                         const Eigen::Isometry3d& T_world_camera = Eigen::Isometry3d::Identity()) {
+  replay::RecordedFrame frame;
+  frame.depth = cv::Mat(camera.height, camera.width, CV_32FC1, cv::Scalar(depth));
+  frame.intrinsics = camera;
+  frame.T_world_camera = T_world_camera;
+  return frame;
+}
+
+/// What a camera sees of the room [m], exactly.
+inline replay::RecordedFrame room_frame(const replay::Room& room, const Intrinsics& camera, const Eigen::Isometry3d& T_world_camera) {
+  replay::RecordedFrame frame = plane_frame(camera, 0, T_world_camera);
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u) frame.depth.at<float>(v, u) = static_cast<float>(room.depth(T_world_camera, camera, u, v));
+  return frame;
+}
+
+/// Every `stride`-th frame of a walk of 200 around the room's table.
+inline Frames orbit_frames(const Intrinsics& camera, int count, int stride = 1) {
+  const replay::Room room;
+  Frames frames;
+  for (int n = 0; n < count; ++n) frames.push_back(room.render(n * stride, 200, camera));
+  return frames;
+}
+
+inline void integrate_all(Mapper& mapper, const Frames& frames) {
+  for (const auto& frame : frames) mapper.integrate(frame.view());
+}
+
+inline std::vector<Surfel> map_of(const Frames& frames, const Config& config) {
+  Mapper mapper(config);
+  integrate_all(mapper, frames);
+  return mapper.surfels();
+}
+
+inline scoring::ExactScore score(const std::vector<Surfel>& surfels, const Frames& frames, const Config& config) {
+  scoring::ExactTest exact(config.z_min, config.z_max, config.decimation);
+  for (const auto& frame : frames) exact.add(frame.view());
+  return exact.score(surfels);
+}
+
+inline std::string text(const scoring::ExactScore& s, std::size_t surfels) {
+  char line[200];
+  std::snprintf(line, sizeof line,
+                "%zu surfels: right %.4f buried %.4f within_2v %.4f fdr_2cm %.4f fdr_5cm %.5f miss_2cm %.5f miss_5cm %.5f label_ok %.4f",
+                surfels, s.right, s.buried, s.within_2v, s.fdr_2cm, s.fdr_5cm, s.miss_2cm, s.miss_5cm, s.label_ok);
+  return line;
+}
+
+/// All fields alike to the last bit.
+inline bool same(const Surfel& a, const Surfel& b) {
+  return std::memcmp(a.position.data(), b.position.data(), 3 * sizeof(float)) == 0 &&
+         std::memcmp(a.normal.data(), b.normal.data(), 3 * sizeof(float)) == 0 && std::memcmp(&a.radius, &b.radius, sizeof(float)) == 0 &&
+         a.label == b.label && a.rgb == b.rgb && a.id == b.id;
+}
+
+inline testing::AssertionResult same(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
+  if (a.size() != b.size()) return testing::AssertionFailure() << a.size() << " surfels against " << b.size();
+  for (std::size_t n = 0; n < a.size(); ++n)
+    if (!same(a[n], b[n])) return testing::AssertionFailure() << "surfel " << n << " of " << a.size() << " differs";
+  return testing::AssertionSuccess();
+}
+
+/// What a surfel can be at all: finite, of unit normal, with a radius.
+inline testing::AssertionResult all_sound(const std::vector<Surfel>& surfels) {
+  for (const Surfel& s : surfels)
+    if (!s.position.allFinite() || !(std::abs(s.normal.norm() - 1) < 1e-4F) || !(s.radius > 0) || !std::isfinite(s.radius))
+      return testing::AssertionFailure() << "surfel " << s.id << " at " << s.position.transpose() << ", normal " << s.normal.transpose()
+                                         << ", radius " << s.radius;
+  for (std::size_t n = 1; n < surfels.size(); ++n)
+    if (surfels[n - 1].id >= surfels[n].id) return testing::AssertionFailure() << "ids do not ascend at " << n;
+  return testing::AssertionSuccess();
+}
+
+/// A subscriber's copy of the map, from its changes alone.
+class Follower {
+ public:
+  void apply(const Changes& changes) {
+    for (const std::uint32_t id : changes.removed) surfels_.erase(id);
+    for (const Surfel& surfel : changes.updated) surfels_[surfel.id] = surfel;
+    sequence_ = changes.sequence;
+  }
+  std::uint64_t sequence() const { return sequence_; }
+  std::vector<Surfel> surfels() const {
+    std::vector<Surfel> all;
+    for (const auto& [id, surfel] : surfels_) all.push_back(surfel);
+    return all;
+  }
+
+ private:
+  std::map<std::uint32_t, Surfel> surfels_;
+  std::uint64_t sequence_ = 0;
+};
+
+/// what() of the error of kind E that `call` throws; "" if it throws none.
+template <typename E, typename Call>
+std::string fault_of(Call&& call) {
+  try {
+    call();
+  } catch (const E& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,225 @@
+/// Access to the fields and lists between the stages, so that each one can be tested alone.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "opencl/commands.hpp"
+#include "random_input.hpp"
+#include "recent_views.hpp"
+#include "reference_field.hpp"
+#include "stages.hpp"
+#include "surfel_map.hpp"
+
+namespace frontier_surfels {
+
+/// The OpenCL platform to test on, part of its name; empty: the first.
+inline std::string test_platform() {
+  const char* platform = std::getenv("FRONTIER_SURFELS_TEST_PLATFORM");
+  return platform == nullptr ? "" : platform;
+}
+
+inline Device test_device() {
+  Config config;
+  config.platform = test_platform();
+  return choose_device(config);
+}
+
+/// Built once a program: compiling the kernels takes longer than most tests. Never destroyed: at the program's end a driver may be gone
+/// before it.
+inline Commands& test_commands() {
+  static auto* const commands = new Commands(test_device());
+  return *commands;
+}
+
+/// The stages with one camera and everything that they work on.
+class StagesProbe {
+ public:
+  explicit StagesProbe(const Config& config, Commands& commands = test_commands())
+      : commands_(commands), map_(commands), views_(commands, config), stages_(commands, config, map_, views_) {
+    views_.clear(false);  // as if views had been forgotten: the known space must be computed
+  }
+
+  Stages& stages() { return stages_; }
+  SurfelMap& map() { return map_; }
+  RecentViews& views() { return views_; }
+  Commands& commands() { return commands_; }
+
+  const Grid& grid() const { return stages_.grid_; }
+  const Limits& limits() const { return stages_.limits_; }
+  std::vector<float> layer_depth() const { return stages_.layer_depth_.read(grid().size_k); }
+
+  using Bits = reference::Field<char>;
+  Bits observed() const { return read_bits(stages_.observed_); }
+  Bits known() const { return read_bits(stages_.known_); }
+  Bits filtered() const { return read_bits(stages_.filtered_); }
+  Bits occupied_voxels() const { return read_bits(stages_.occupied_voxels_); }
+  Bits candidates() const { return read_bits(stages_.candidates_); }
+  void set_observed(const Bits& bits) { stages_.observed_.write(reference::pack(bits)); }
+  void set_known(const Bits& bits) { stages_.known_.write(reference::pack(bits)); }
+  void set_filtered(const Bits& bits) { stages_.filtered_.write(reference::pack(bits)); }
+  void set_occupied_voxels(const Bits& bits) { stages_.occupied_voxels_.write(reference::pack(bits)); }
+  void set_candidates(const Bits& bits) { stages_.candidates_.write(reference::pack(bits)); }
+
+  /// @param family  0, 1, 2: paths along i, j, k; @param event  EVENT_ENTER_FORWARD and so on
+  Bits event(int family, int event) const { return read_bits(stages_.events_, (family * EVENT_PLANES + event) * stages_.words()); }
+  void set_event(int family, int event, const Bits& bits) {
+    stages_.events_.write(reference::pack(bits), (family * EVENT_PLANES + event) * stages_.words());
+  }
+
+  /// States of the paths that enter through a face: [size_j][1][size_k] of the i faces, [size_i][1][size_k] of the j faces, and
+  /// [size_j][1][size_i] of the k faces.
+  std::vector<Bits> hull() const {
+    const int i = grid().size_i, j = grid().size_j, k = grid().size_k;
+    std::vector<Bits> faces;
+    std::size_t at = 0;
+    for (int face = FACE_I_LOW; face <= FACE_K_HIGH; ++face) {
+      const bool along_k = face >= FACE_K_LOW;
+      const int rows = face == FACE_J_LOW || face == FACE_J_HIGH ? i : j, columns = along_k ? i : k;
+      const std::size_t words = along_k ? columns : grid().words_k;
+      faces.push_back(unpack_face(stages_.hull_.read(rows * words, at), rows, columns, along_k));
+      at += rows * words;
+    }
+    return faces;
+  }
+
+  void set_hull(const std::vector<Bits>& faces) {
+    std::vector<std::uint64_t> hull;
+    for (int face = FACE_I_LOW; face <= FACE_K_HIGH; ++face) {
+      const Bits& bits = faces[face];
+      const std::size_t words = face >= FACE_K_LOW ? bits.size_k : (bits.size_k + 63) / 64;
+      for (int row = 0; row < bits.size_i; ++row) {
+        std::vector<std::uint64_t> line(words, 0);
+        for (int column = 0; column < bits.size_k; ++column) {
+          if (!bits(row, 0, column)) continue;
+          line[face >= FACE_K_LOW ? column : column / 64] |= face >= FACE_K_LOW ? 1 : std::uint64_t{1} << (column % 64);
+        }
+        hull.insert(hull.end(), line.begin(), line.end());
+      }
+    }
+    stages_.hull_.write(hull);
+  }
+
+  /// Takes surfels out of the map, as an earlier frame would have: their slots are free, the last one first.
+  void kill(const std::vector<std::uint32_t>& slots) {
+    const cl_float4 dead = {{0, 0, 0, 0}};
+    for (const std::uint32_t slot : slots)
+      commands_.queue().enqueueWriteBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(dead), sizeof(dead), &dead);
+    commands_.queue().enqueueWriteBuffer(map_.free_list(), CL_TRUE, map_.free_slots() * sizeof(cl_uint), slots.size() * sizeof(cl_uint),
+                                         slots.data());
+    map_.removed(slots.size());
+  }
+
+  std::uint32_t attributes(std::uint32_t slot) const {
+    std::uint32_t bits;
+    commands_.queue().enqueueReadBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(cl_float4) + 3 * sizeof(float), sizeof(bits),
+                                        &bits);
+    return bits;
+  }
+
+  void make_ragged(const std::vector<std::uint32_t>& slots) {
+    for (const std::uint32_t slot : slots) {
+      const std::uint32_t bits = attributes(slot) | SURFEL_RAGGED;
+      commands_.queue().enqueueWriteBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(cl_float4) + 3 * sizeof(float), sizeof(bits),
+                                           &bits);
+    }
+  }
+
+  /// In the order in which they were freed.
+  std::vector<std::uint32_t> free_list() const {
+    std::vector<std::uint32_t> slots(map_.free_slots());
+    if (slots.empty()) return slots;
+    commands_.queue().enqueueReadBuffer(map_.free_list(), CL_TRUE, 0, slots.size() * sizeof(cl_uint), slots.data());
+    return slots;
+  }
+
+  /// The first slots that new surfels take: free ones, the last freed first, then those beyond the end.
+  std::vector<std::uint32_t> new_slots(std::size_t count) const {
+    std::vector<std::uint32_t> slots = free_list();
+    std::reverse(slots.begin(), slots.end());
+    for (std::size_t slot = map_.slots(); slots.size() < count; ++slot) slots.push_back(static_cast<std::uint32_t>(slot));
+    slots.resize(count);
+    return slots;
+  }
+
+  /// Lets section 4 work on all paths through the voxels around these candidates, no more. Replaces the candidates.
+  void need_paths_around(const Bits& candidates) {
+    set_candidates(candidates);
+    stages_.settle_by_recent_views();
+  }
+  void need_all_paths() { need_paths_around(Bits(grid(), 1)); }
+
+  /// Paths to be walked: along i [size_j][1][size_k], along j [size_i][1][size_k], along k [size_j][1][size_i].
+  std::vector<Bits> needed_paths() const {
+    const int i = grid().size_i, j = grid().size_j, k = grid().size_k;
+    const std::vector<std::uint32_t> lines = stages_.lines_.read(stages_.line_numbers());
+    std::vector<Bits> paths = {Bits(j, 1, k, 0), Bits(i, 1, k, 0), Bits(j, 1, i, 0)};
+    auto next = lines.begin();
+    for (Bits* along : {&paths[0], &paths[1]})
+      for (int row = 0; row < along->size_i; ++row)
+        for (int half = 0; half < 2 * grid().words_k; ++half, ++next)
+          for (int bit = 0; bit < 32 && 32 * half + bit < k; ++bit) (*along)(row, 0, 32 * half + bit) = *next >> bit & 1;
+    for (char& path : paths[2].values) path = *next++ != 0;
+    return paths;
+  }
+
+  std::size_t in_view() const { return stages_.in_view_; }
+  std::vector<std::uint32_t> in_view_slots() const { return stages_.in_view_slots_.read(in_view()); }
+  std::vector<ViewSurfel> view_surfels() const { return stages_.view_surfels_.read(in_view()); }
+  void set_view_surfels(const std::vector<ViewSurfel>& surfels) {
+    stages_.view_surfels_.resize(1);
+    stages_.view_surfels_.write(surfels);
+    stages_.in_view_ = surfels.size();
+  }
+  void set_in_view_slots(const std::vector<std::uint32_t>& slots) {
+    stages_.in_view_slots_.resize(1);
+    stages_.in_view_slots_.write(slots);
+    stages_.in_view_ = slots.size();
+  }
+  std::vector<std::uint64_t> removed_bits() const { return stages_.removed_bits_.read((in_view() + 63) / 64); }
+  void set_removed_bits(const std::vector<std::uint64_t>& bits) {
+    stages_.removed_bits_.resize(bits.size() + 1);
+    stages_.removed_bits_.write(bits);
+  }
+  std::vector<std::uint32_t> created_voxels() const { return stages_.created_voxels_.read(stages_.created_count_); }
+
+  /// @return prefix sums, the total behind them
+  std::vector<std::uint32_t> scan(const std::vector<std::uint32_t>& values, std::uint32_t* total) {
+    DeviceArray<cl_uint> array(commands_);
+    array.resize(values.size() + 1);
+    array.write(values);
+    *total = stages_.scan("test", array, values.size());
+    return array.read(values.empty() ? 0 : values.size() + 1);
+  }
+
+  std::vector<std::uint32_t> list_bits(const std::vector<std::uint64_t>& words) {
+    DeviceArray<cl_ulong> bits(commands_);
+    DeviceArray<cl_uint> list(commands_);
+    bits.write(words);
+    return list.read(stages_.list_bits("test", bits, words.size(), list));
+  }
+
+ private:
+  Bits read_bits(const DeviceArray<cl_ulong>& array, std::size_t offset = 0) const {
+    return reference::unpack(array.read(stages_.words(), offset), grid().size_i, grid().size_j, grid().size_k);
+  }
+
+  static Bits unpack_face(const std::vector<std::uint64_t>& words, int rows, int columns, bool word_each) {
+    const std::size_t words_row = words.size() / rows;
+    Bits bits(rows, 1, columns, 0);
+    for (int row = 0; row < rows; ++row)
+      for (int column = 0; column < columns; ++column)
+        bits(row, 0, column) = word_each ? words[row * words_row + column] != 0 : words[row * words_row + column / 64] >> (column % 64) & 1;
+    return bits;
+  }
+
+  Commands& commands_;
+  SurfelMap map_;
+  RecentViews views_;
+  Stages stages_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,167 @@
+/// The changes since a sequence number, and parts of the map.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <set>
+
+#include "mapper_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using Map = std::vector<Surfel>;
+
+const Surfel* find(const Map& map, std::uint32_t id) {
+  const auto found = std::lower_bound(map.begin(), map.end(), id, [](const Surfel& s, std::uint32_t wanted) { return s.id < wanted; });
+  return found != map.end() && found->id == id ? &*found : nullptr;
+}
+
+/// A mapper that has done all that it can do, and its map at every sequence number.
+class MapperChanges : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = (std::filesystem::temp_directory_path() / ("changes_" + std::to_string(getpid()) + ".ply")).string();
+    note();
+    const Frames frames = orbit_frames(coarse_camera(), 6, 6);
+    for (int n = 0; n < 4; ++n) integrate(frames[n]);
+    mapper_.save(path_);
+    integrate(frames[4]);
+    mapper_.load(path_);  // smaller than the map, so that ids are left over
+    note();
+    integrate(frames[5]);
+    integrate(plane_frame(coarse_camera(), 0, replay::orbit_pose(0, 200)));  // nothing changes
+    mapper_.reset();
+    note();
+    const Eigen::Vector3d forward(0, 1, 0);
+    for (const double depth : {2.5, 1.2, 0.55}) integrate(plane_frame(coarse_camera(), depth, look_along(-depth * forward, forward)));
+    mapper_.load(path_);
+    note();
+    integrate(frames[0]);
+  }
+  void TearDown() override { std::remove(path_.c_str()); }
+
+  void integrate(const replay::RecordedFrame& frame) {
+    const Report report = mapper_.integrate(frame.view());
+    note();
+    EXPECT_EQ(report.sequence, mapper_.sequence());
+    EXPECT_EQ(report.surfels, maps_.back().size());
+    split_ += report.split;
+  }
+
+  void note() {
+    ASSERT_EQ(mapper_.sequence(), maps_.size()) << "every frame, reset and load counts one up";
+    maps_.push_back(mapper_.surfels());
+    EXPECT_TRUE(all_sound(maps_.back()));
+    const Changes changes = mapper_.changes(follower_.sequence());
+    EXPECT_EQ(changes.sequence, mapper_.sequence());
+    follower_.apply(changes);
+    EXPECT_TRUE(same(follower_.surfels(), maps_.back())) << "followed to " << mapper_.sequence();
+  }
+
+  std::string path_;
+  Mapper mapper_{undecimated()};
+  std::vector<Map> maps_;  ///< [sequence]
+  Follower follower_;      ///< asks after every step
+  std::size_t split_ = 0;
+};
+
+TEST_F(MapperChanges, LeadFromAnyMapToThisOne) {
+  EXPECT_GT(split_, 0u);
+  for (std::uint64_t since = 0; since < maps_.size(); ++since) {
+    SCOPED_TRACE("since " + std::to_string(since));
+    Changes then;
+    then.updated = maps_[since];
+    Follower follower;
+    follower.apply(then);
+    const Changes changes = mapper_.changes(since);
+    follower.apply(changes);
+    EXPECT_TRUE(same(follower.surfels(), maps_.back()));
+    EXPECT_EQ(follower.sequence(), mapper_.sequence());
+
+    for (const Surfel& surfel : changes.updated) ASSERT_NE(find(maps_.back(), surfel.id), nullptr) << surfel.id;
+    for (const std::uint32_t id : changes.removed) ASSERT_EQ(find(maps_.back(), id), nullptr) << id << " is not removed";
+    std::set<std::uint32_t> ids(changes.removed.begin(), changes.removed.end());
+    EXPECT_EQ(ids.size(), changes.removed.size()) << "told twice";
+  }
+}
+
+TEST_F(MapperChanges, NothingSinceNowOrLater) {
+  for (const std::uint64_t since : {mapper_.sequence(), mapper_.sequence() + 1, ~std::uint64_t{0}}) {
+    const Changes changes = mapper_.changes(since);
+    EXPECT_TRUE(changes.updated.empty()) << since;
+    EXPECT_TRUE(changes.removed.empty()) << since;
+    EXPECT_EQ(changes.sequence, mapper_.sequence());
+  }
+}
+
+/// One frame's changes name what it has changed, and no more.
+TEST(MapperChange, OfOneFrameIsSmall) {
+  Mapper mapper(undecimated());
+  integrate_all(mapper, orbit_frames(coarse_camera(), 4, 5));
+  const Map before = mapper.surfels();
+  const Report report = mapper.integrate(orbit_frames(coarse_camera(), 5, 5).back().view());
+  const Changes changes = mapper.changes(mapper.sequence() - 1);
+  std::size_t added = 0, changed = 0, unchanged = 0;
+  for (const Surfel& surfel : changes.updated) {
+    const Surfel* old = find(before, surfel.id);
+    ++(old == nullptr || old->position != surfel.position ? added : same(*old, surfel) ? unchanged : changed);
+  }
+  EXPECT_EQ(added, report.created);
+  EXPECT_EQ(unchanged, 0u);
+  EXPECT_GT(changed, 0u) << "frontier becomes occupied";
+  EXPECT_LT(changes.updated.size(), before.size());
+  EXPECT_EQ(before.size() + report.created - report.removed, report.surfels);
+
+  std::set<std::uint32_t> old_ids, reused;
+  for (const Surfel& surfel : before) old_ids.insert(surfel.id);
+  for (const std::uint32_t id : changes.removed) EXPECT_EQ(old_ids.count(id), 1u) << id << " was not in the map";
+  for (const Surfel& surfel : changes.updated)
+    if (old_ids.count(surfel.id) && find(before, surfel.id)->position != surfel.position) reused.insert(surfel.id);
+  EXPECT_GT(reused.size(), 0u) << "freed ids are used again";
+  EXPECT_EQ(changes.removed.size() + reused.size(), report.removed);
+}
+
+/// The report's numbers add up when surfels are split into four.
+TEST(MapperChange, SplitSurfelsAreReplacedByFour) {
+  Mapper mapper(undecimated());
+  const Eigen::Vector3d forward(0, 1, 0);
+  mapper.integrate(plane_frame(coarse_camera(), 2.5, look_along(-2.5 * forward, forward)).view());
+  const Map before = mapper.surfels();
+  const Report report = mapper.integrate(plane_frame(coarse_camera(), 0.52, look_along(-0.52 * forward, forward)).view());
+  const Map after = mapper.surfels();
+
+  std::size_t halved = 0;
+  for (const Surfel& old : before) {
+    const Surfel* now = find(after, old.id);
+    if (now == nullptr || std::abs(now->radius - old.radius / 2) > 1e-6F * old.radius) continue;
+    ++halved;
+    EXPECT_EQ(now->label, old.label);
+    EXPECT_EQ(now->normal, old.normal);
+    EXPECT_NEAR((now->position - old.position).norm(), old.radius / 2, 1e-4 * old.radius) << "half the diagonal of r/(2 sqrt 2)";
+  }
+  EXPECT_GT(halved, 100u);
+  EXPECT_EQ(report.split, halved) << "surfels that were replaced";
+  EXPECT_EQ(after.size(), before.size() + 3 * halved + report.created - report.removed);
+}
+
+TEST(MapperBox, HoldsTheSurfelsInside) {
+  Mapper mapper(undecimated());
+  integrate_all(mapper, orbit_frames(coarse_camera(), 2, 5));
+  const Map all = mapper.surfels();
+  const Eigen::AlignedBox3f box(Eigen::Vector3f(-0.5, -0.7, 0.3), Eigen::Vector3f(0.6, 0.5, 1.1));
+  Map inside;
+  for (const Surfel& s : all)
+    if ((s.position.array() >= box.min().array()).all() && (s.position.array() <= box.max().array()).all()) inside.push_back(s);
+  ASSERT_GT(inside.size(), 100u);
+  ASSERT_LT(inside.size(), all.size());
+  EXPECT_TRUE(same(inside, mapper.surfels(box)));
+
+  const float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_TRUE(same(all, mapper.surfels(Eigen::AlignedBox3f(Eigen::Vector3f::Constant(-infinity), Eigen::Vector3f::Constant(infinity)))));
+  EXPECT_TRUE(mapper.surfels(Eigen::AlignedBox3f()).empty());
+  EXPECT_EQ(mapper.surfels(Eigen::AlignedBox3f(all[7].position)).size(), 1u) << "the border belongs to the box";
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,226 @@
+/// Maps that are saved, loaded and reset, and the numbers that are told of them.
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <tuple>
+
+#include "mapper_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The same surfels in the same order, whatever their ids.
+testing::AssertionResult same_but_ids(std::vector<Surfel> a, std::vector<Surfel> b) {
+  for (auto* surfels : {&a, &b})
+    for (std::size_t n = 0; n < surfels->size(); ++n) (*surfels)[n].id = static_cast<std::uint32_t>(n);
+  return same(a, b);
+}
+
+std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
+  const auto key = [](const Surfel& s) {
+    return std::make_tuple(s.position.x(), s.position.y(), s.position.z(), s.normal.x(), s.normal.y(), s.radius);
+  };
+  std::sort(surfels.begin(), surfels.end(), [&](const Surfel& a, const Surfel& b) { return key(a) < key(b); });
+  return surfels;
+}
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class MapperFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "maps_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    path_ = (folder_ / "map.ply").string();
+    integrate_all(mapper_, frames_);
+    surfels_ = mapper_.surfels();
+    ASSERT_GT(surfels_.size(), 10000u);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::size_t files() const { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator()); }
+
+  /// A map that cannot be loaded leaves the mapper as it was: its map, its sequence number, and what it makes of the next frame.
+  void expect_refused(const std::string& path) {
+    const std::string said = fault_of<FileError>([&] { mapper_.load(path); });
+    EXPECT_NE(said.find(path), std::string::npos) << "said '" << said << "'";
+    EXPECT_TRUE(same(surfels_, mapper_.surfels()));
+    EXPECT_EQ(mapper_.sequence(), frames_.size());
+  }
+
+  Frames frames_ = orbit_frames(coarse_camera(), 3, 6);
+  Mapper mapper_{undecimated()};
+  std::vector<Surfel> surfels_;
+  fs::path folder_;
+  std::string path_;
+};
+
+TEST_F(MapperFiles, ASavedMapComesBack) {
+  mapper_.save(path_);
+  EXPECT_EQ(files(), 1u);
+  EXPECT_TRUE(same(surfels_, mapper_.surfels())) << "saving changes nothing";
+  EXPECT_TRUE(std::any_of(surfels_.begin(), surfels_.end(), [](const Surfel& s) { return s.rgb[0] > 0; }));
+
+  Mapper other(undecimated());
+  other.load(path_);
+  EXPECT_TRUE(same_but_ids(surfels_, other.surfels()));
+  EXPECT_EQ(other.surfels().back().id, surfels_.size() - 1) << "ids are counted anew";
+  EXPECT_EQ(other.sequence(), 1u);
+
+  mapper_.load(path_);
+  EXPECT_TRUE(same(other.surfels(), mapper_.surfels())) << "over a map as into an empty one";
+}
+
+/// A loaded map is as good as the one that was saved: the next frames make the same of it.
+TEST_F(MapperFiles, MappingGoesOnWithALoadedMap) {
+  Config config = undecimated();
+  config.recent_views = 0;  // these are not saved
+  Mapper through(config), resumed(config);
+  Frames plain = orbit_frames(coarse_camera(), 6, 6);
+  for (auto& frame : plain) frame.color.release();
+  for (int n = 0; n < 3; ++n) through.integrate(plain[n].view());
+  through.save(path_);
+  resumed.load(path_);
+  for (int n = 3; n < 6; ++n) {
+    const Report a = through.integrate(plain[n].view()), b = resumed.integrate(plain[n].view());
+    EXPECT_EQ(a.created, b.created);
+    EXPECT_EQ(a.removed, b.removed);
+  }
+  EXPECT_TRUE(same_but_ids(sorted(through.surfels()), sorted(resumed.surfels())));
+}
+
+TEST_F(MapperFiles, AnEmptyMapIsAMap) {
+  Mapper empty(undecimated());
+  empty.save(path_);
+  mapper_.load(path_);
+  EXPECT_TRUE(mapper_.surfels().empty());
+  EXPECT_EQ(mapper_.statistics().surfels, 0u);
+  integrate_all(mapper_, frames_);
+  EXPECT_TRUE(same(surfels_, mapper_.surfels())) << "as if new";
+}
+
+TEST_F(MapperFiles, LoadingForgetsTheRecentViews) {
+  mapper_.save(path_);
+  mapper_.load(path_);
+  EXPECT_TRUE(mapper_.integrate(frames_.back().view()).view_kept);
+  EXPECT_FALSE(mapper_.integrate(frames_.back().view()).view_kept) << "the camera has not moved";
+  mapper_.reset();
+  EXPECT_TRUE(mapper_.integrate(frames_.back().view()).view_kept);
+}
+
+TEST_F(MapperFiles, AFileThatIsMissingOrDamagedIsRefused) {
+  expect_refused((folder_ / "missing.ply").string());
+  expect_refused((folder_ / "no_folder" / "map.ply").string());
+  expect_refused(folder_.string());
+  mapper_.save(path_);
+  const std::string whole = bytes_of(path_);
+  const auto put = [&](const std::string& bytes) { std::ofstream(path_, std::ios::binary) << bytes; };
+  for (const std::size_t size : {std::size_t{0}, std::size_t{100}, whole.size() / 2, whole.size() - 32, whole.size() - 1}) {
+    SCOPED_TRACE("cut off after " + std::to_string(size));
+    put(whole.substr(0, size));
+    expect_refused(path_);
+  }
+  for (const std::size_t at : {whole.size() - 1, whole.size() / 2, std::size_t{10}}) {
+    SCOPED_TRACE("damaged at " + std::to_string(at));
+    std::string damaged = whole;
+    damaged[at] ^= 0x40;
+    put(damaged);
+    expect_refused(path_);
+  }
+  Mapper untroubled(undecimated());
+  integrate_all(untroubled, frames_);
+  const auto next = orbit_frames(coarse_camera(), 4, 6).back();
+  mapper_.integrate(next.view());
+  untroubled.integrate(next.view());
+  EXPECT_TRUE(same(untroubled.surfels(), mapper_.surfels()));
+}
+
+TEST_F(MapperFiles, SavingWhereItCannotBe) {
+  for (const fs::path& path : {folder_ / "no_folder" / "map.ply", folder_, fs::path("/dev/full")}) {
+    const std::string said = fault_of<FileError>([&] { mapper_.save(path.string()); });
+    EXPECT_NE(said.find(path.string()), std::string::npos) << "said '" << said << "'";
+  }
+  EXPECT_EQ(files(), 0u) << "nothing is left behind";
+  EXPECT_TRUE(same(surfels_, mapper_.surfels()));
+}
+
+TEST_F(MapperFiles, AFullDiskKeepsTheOldFile) {
+  const fs::path disk = folder_ / "disk";
+  fs::create_directory(disk);
+  if (mount("none", disk.c_str(), "tmpfs", 0, "size=64k") != 0)
+    GTEST_SKIP() << "A small disk cannot be mounted here (" << std::strerror(errno) << "): run as root to test a full one.";
+  const std::string path = (disk / "map.ply").string();
+  Mapper(undecimated()).save(path);
+  const std::string old = bytes_of(path);
+  const std::string said = fault_of<FileError>([&] { mapper_.save(path); });
+  EXPECT_NE(said.find(path), std::string::npos) << "said '" << said << "'";
+  EXPECT_EQ(bytes_of(path), old);
+  EXPECT_EQ(std::distance(fs::directory_iterator(disk), fs::directory_iterator()), 1) << "a temporary file is left";
+  umount(disk.c_str());
+}
+
+TEST_F(MapperFiles, AReadOnlyFolderKeepsTheOldFile) {
+  if (geteuid() == 0) GTEST_SKIP() << "Root may write into any folder: run as somebody else to test one that is read-only.";
+  Mapper(undecimated()).save(path_);
+  const std::string old = bytes_of(path_);
+  fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_THROW(mapper_.save(path_), FileError);
+  fs::permissions(folder_, fs::perms::owner_all);
+  EXPECT_EQ(bytes_of(path_), old);
+}
+
+TEST_F(MapperFiles, ResetEmptiesTheMap) {
+  mapper_.reset();
+  EXPECT_TRUE(mapper_.surfels().empty());
+  EXPECT_EQ(mapper_.sequence(), frames_.size() + 1) << "the sequence number goes on";
+  EXPECT_EQ(mapper_.statistics().surfels, 0u);
+  EXPECT_EQ(mapper_.changes(frames_.size()).removed.size(), surfels_.size());
+  mapper_.reset();
+  EXPECT_TRUE(mapper_.surfels().empty());
+}
+
+TEST_F(MapperFiles, StatisticsFitTheMap) {
+  const Statistics statistics = mapper_.statistics();
+  const auto occupied = static_cast<std::size_t>(
+      std::count_if(surfels_.begin(), surfels_.end(), [](const Surfel& s) { return s.label == Label::kOccupied; }));
+  EXPECT_EQ(statistics.surfels, surfels_.size());
+  EXPECT_EQ(statistics.occupied, occupied);
+  EXPECT_EQ(statistics.frontier, surfels_.size() - occupied);
+  EXPECT_GT(occupied, 1000u);
+  EXPECT_LT(occupied, surfels_.size());
+
+  // A position, a radius, a normal and attributes are 32 bytes; what is spare is not many times as much.
+  EXPECT_GE(statistics.map_bytes, 32 * surfels_.size());
+  EXPECT_LT(statistics.map_bytes, 200 * surfels_.size());
+  EXPECT_GT(statistics.device_bytes, statistics.map_bytes);
+  EXPECT_LT(statistics.device_bytes, std::size_t{500} << 20) << "for a grid of 90 x 70 x 187 voxels";
+
+  Mapper empty(undecimated());
+  EXPECT_EQ(empty.statistics().surfels, 0u);
+  EXPECT_LT(empty.statistics().device_bytes, statistics.device_bytes);
+}
+
+TEST_F(MapperFiles, MemoryIsReleasedAndNotPiledUp) {
+  std::size_t bytes[6];
+  for (std::size_t& now : bytes) {
+    mapper_.reset();
+    integrate_all(mapper_, frames_);
+    now = mapper_.statistics().device_bytes;
+  }
+  EXPECT_EQ(bytes[1], bytes[5]);
+}
+
+}  // namespace
+}  // namespace frontier_surfels

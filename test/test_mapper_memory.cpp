@@ -1,0 +1,58 @@
+/// A device that is too small: a DeviceError says so, and smaller frames go on.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "mapper_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+// PoCL then offers one GiB. Before the first call into OpenCL, which reads it. Other devices may be too large for these tests.
+const int kSmallDevice = setenv("POCL_MEMORY_LIMIT", "1", 1);
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Integrates a frame that the device has no room for.
+std::string refusal(Mapper& mapper, const DepthFrame& frame) {
+  return fault_of<DeviceError>([&] { mapper.integrate(frame); });
+}
+
+void expect_goes_on(Mapper& mapper, const std::vector<Surfel>& before, const Frames& frames) {
+  EXPECT_TRUE(same(before, mapper.surfels()));
+  for (const auto& frame : frames) EXPECT_NO_THROW(mapper.integrate(frame.view()));
+  EXPECT_TRUE(all_sound(mapper.surfels()));
+  EXPECT_GT(mapper.surfels().size(), before.size());
+}
+
+/// One buffer is larger than the device allows: a grid of 1.6e9 voxels.
+TEST(MapperMemory, AGridTooLargeForTheDevice) {
+  const Frames frames = orbit_frames(coarse_camera(), 12, 3);
+  Mapper mapper(undecimated());
+  for (int n = 0; n < 3; ++n) mapper.integrate(frames[n].view());
+  const auto before = mapper.surfels();
+  const auto large = plane_frame(plain_camera(1400, 1400, 250), 1);
+  const std::string said = refusal(mapper, large.view());
+  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  EXPECT_TRUE(contains(said, "MiB")) << said;
+  EXPECT_TRUE(contains(said, "decimation")) << said;
+  expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
+}
+
+/// The pool of recent views is larger than the device allows, the grid is not.
+TEST(MapperMemory, RecentViewsTooManyForTheDevice) {
+  const Frames frames = orbit_frames(coarse_camera(), 12, 3);
+  Config config = undecimated();
+  config.recent_views = 1024;
+  Mapper mapper(config);
+  for (int n = 0; n < 3; ++n) mapper.integrate(frames[n].view());
+  const auto before = mapper.surfels();
+  const auto large = plane_frame(plain_camera(1000, 1000, 5), 1);
+  const std::string said = refusal(mapper, large.view());
+  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  EXPECT_TRUE(contains(said, "MiB")) << said;
+  expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
+}
+
+}  // namespace
+}  // namespace frontier_surfels

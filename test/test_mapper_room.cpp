@@ -1,0 +1,132 @@
+/// The map of a room whose every surface is known, against what the frames have seen and against the room itself.
+#include <gtest/gtest.h>
+
+#include "mapper_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kVoxelsOfRadius = 2 / 1.7320508;  // a new surfel's radius is sqrt(3)/2 voxels
+
+/// A walk and its map, made once for all tests.
+struct Walk {
+  Config config = undecimated();
+  replay::Room room;
+  Frames frames = orbit_frames(working_camera(), 20, 4);
+  std::vector<Surfel> surfels = map_of(frames, config);
+
+  static const Walk& instance() {
+    static const Walk walk;
+    return walk;
+  }
+
+  /// Whether a frame's ray passes p, by the geometry of the room: no pixels, no rounding.
+  bool seen(const Vector3d& p_world) const {
+    return std::any_of(frames.begin(), frames.end(), [&](const replay::RecordedFrame& frame) {
+      const Intrinsics& camera = frame.intrinsics;
+      const Vector3d p = frame.T_world_camera.inverse() * p_world;
+      if (p.z() <= 0) return false;
+      const double u = p.x() / p.z() * camera.fx + camera.cx, v = p.y() / p.z() * camera.fy + camera.cy;
+      if (u < -0.5 || v < -0.5 || u >= camera.width - 0.5 || v >= camera.height - 0.5) return false;
+      const double depth = room.depth(frame.T_world_camera, camera, u, v);
+      return config.z_min <= depth && depth <= config.z_max && p.z() < depth;
+    });
+  }
+};
+
+/// Share of the surfels, every `stride`-th, of which `holds` says true.
+template <typename Predicate>
+double share(const std::vector<Surfel>& surfels, std::size_t stride, Predicate&& holds) {
+  std::size_t count = 0, held = 0;
+  for (std::size_t n = 0; n < surfels.size(); n += stride) {
+    const Surfel& s = surfels[n];
+    ++count;
+    held += holds(s.position.cast<double>(), s.normal.cast<double>(), kVoxelsOfRadius * s.radius);
+  }
+  return count > 0 ? static_cast<double>(held) / static_cast<double>(count) : 0;
+}
+
+TEST(MapperRoom, MeasuresUpToTheExactTest) {
+  const Walk& walk = Walk::instance();
+  const auto s = score(walk.surfels, walk.frames, walk.config);
+  SCOPED_TRACE(text(s, walk.surfels.size()));
+  EXPECT_GE(s.right, 0.975);
+  EXPECT_LE(s.buried, 0.002);
+  EXPECT_GE(s.within_2v, 0.993);
+  EXPECT_LE(s.fdr_5cm, 0.003);
+  EXPECT_LE(s.miss_2cm, 0.002);
+  EXPECT_LE(s.miss_5cm, 0.0005);
+  EXPECT_GE(s.label_ok, 0.975);
+  EXPECT_GT(s.boundary_points, 10000U);
+  EXPECT_TRUE(all_sound(walk.surfels));
+}
+
+TEST(MapperRoom, OccupiedSurfelsLieOnTheRoomsSurfaces) {
+  const Walk& walk = Walk::instance();
+  std::vector<Surfel> occupied;
+  std::copy_if(walk.surfels.begin(), walk.surfels.end(), std::back_inserter(occupied),
+               [](const Surfel& s) { return s.label == Label::kOccupied; });
+  ASSERT_GT(occupied.size(), 30000U);
+  const auto off = [&](double voxels) {
+    return share(occupied, 1,
+                 [&](const Vector3d& p, const Vector3d&, double voxel) { return std::abs(walk.room.distance(p)) > voxels * voxel; });
+  };
+  EXPECT_LE(off(1), 0.015);
+  EXPECT_LE(off(2), 0.002);
+  EXPECT_LE(share(occupied, 1,
+                  [&](const Vector3d& p, const Vector3d& normal, double voxel) {
+                    return walk.room.distance(p + 2 * voxel * normal) < walk.room.distance(p);
+                  }),
+            0.003)
+      << "their normals point into free space";
+}
+
+TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
+  const Walk& walk = Walk::instance();
+  EXPECT_LE(share(walk.surfels, 1, [&](const Vector3d& p, const Vector3d&, double voxel) { return walk.room.distance(p) < -2 * voxel; }),
+            0.0005);
+
+  /// Of the points `voxels` voxels from a surfel along the axes, and in front of it: how many are seen.
+  const auto seen_around = [&](const Vector3d& p, const Vector3d& normal, double distance) {
+    int count = walk.seen(p + distance * normal);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double sign : {-1.0, 1.0}) count += walk.seen(p + sign * distance * Vector3d::Unit(axis));
+    return count;
+  };
+  EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, voxel) == 7; }),
+            0.01)
+      << "all around is known";
+  EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, 2 * voxel) == 0; }),
+            0.012)
+      << "nothing around is known";
+  EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return walk.seen(p - voxel * n); }), 0.04)
+      << "known space is behind";
+}
+
+TEST(MapperRoom, EverySurfaceThatWasSeenHasItsSurfels) {
+  const Walk& walk = Walk::instance();
+  cv::RNG random(3);
+  int points = 0, bare = 0, not_occupied = 0;
+  while (points < 500) {
+    const auto& frame = walk.frames[random.uniform(0, static_cast<int>(walk.frames.size()))];
+    const Intrinsics& camera = frame.intrinsics;
+    const int u = random.uniform(0, camera.width), v = random.uniform(0, camera.height);
+    const double depth = frame.depth.at<float>(v, u);
+    if (depth < walk.config.z_min || depth > walk.config.z_max) continue;
+    ++points;
+    const Vector3d q = frame.T_world_camera * Vector3d((u - camera.cx) / camera.fx * depth, (v - camera.cy) / camera.fy * depth, depth);
+    const auto nearest = std::min_element(walk.surfels.begin(), walk.surfels.end(),
+                                          [q = Eigen::Vector3f(q.cast<float>())](const Surfel& a, const Surfel& b) {
+                                            return (a.position - q).squaredNorm() < (b.position - q).squaredNorm();
+                                          });
+    bare += (nearest->position.cast<double>() - q).norm() > 1.5 * depth / camera.fx;
+    not_occupied += nearest->label != Label::kOccupied;
+  }
+  EXPECT_LE(bare, 10) << "of 500, where pixels are far apart on slanting surfaces";
+  EXPECT_LE(not_occupied, 30);
+}
+
+}  // namespace
+}  // namespace frontier_surfels

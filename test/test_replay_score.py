@@ -1,0 +1,243 @@
+#!/usr/bin/python3
+"""The command replay_score from outside: usage, errors, and all that it writes about a small synthetic room.
+
+usage: test_replay_score.py REPLAY_SCORE MAKE_SYNTHETIC
+"""
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy
+
+PROGRAM, MAKE_SYNTHETIC = None, None
+FRAMES = 16
+DONE, FAILED, WRONG_USAGE = 0, 1, 2
+SURFEL = numpy.dtype([(name, '<f4') for name in ('x', 'y', 'z', 'nx', 'ny', 'nz', 'radius')] +
+                     [(name, 'u1') for name in ('red', 'green', 'blue', 'label')])
+
+
+def run(*arguments, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=500, **options)
+
+
+def read_json(folder, name='summary.json'):
+    with open(os.path.join(folder, name), encoding='utf-8') as file:
+        return json.load(file)
+
+
+def read_rows(folder):
+    with open(os.path.join(folder, 'frames.csv'), encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def read_surfels(folder, name='surfels.ply'):
+    """By its own reading of the header, so that a fault of the writer is not shared."""
+    with open(os.path.join(folder, name), 'rb') as file:
+        content = file.read()
+    header, body = content.split(b'end_header\n', 1)
+    properties = re.findall(rb'property (\w+) (\w+)', header)
+    assert properties == [(b'float' if SURFEL[name] == '<f4' else b'uchar', name.encode()) for name in SURFEL.names], properties
+    count = int(re.search(rb'element vertex (\d+)', header).group(1))
+    assert len(body) == count * SURFEL.itemsize, f'{len(body)} bytes for {count} surfels'
+    return numpy.frombuffer(body, dtype=SURFEL)
+
+
+class Usage(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.report = os.path.join(self.folder.name, 'report')
+
+    def check_refused(self, code, *sentences, arguments):
+        result = run(*arguments)
+        self.assertEqual(result.returncode, code, result.stderr)
+        for sentence in sentences:
+            self.assertRegex(result.stderr, sentence)
+        self.assertEqual('Usage: ' in result.stderr, code == WRONG_USAGE, result.stderr)
+        self.assertEqual(result.stdout, '')
+        self.assertFalse(os.path.exists(os.path.join(self.report, 'report.html')))
+
+    def test_wrong_usage_is_told_with_the_usage(self):
+        there = [self.folder.name, '--report', self.report]
+        wrong = ['another', '--no-such-option', '--first -1', '--first 5 --last 4', '--stride 0', '--threads many',
+                 '--octomap-resolution -1', '--octomap-resolution nan', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
+        for arguments in [[], [self.folder.name], ['--report', self.report], *([*there, *text.split()] for text in wrong)]:
+            with self.subTest(arguments=arguments):
+                self.check_refused(WRONG_USAGE, 'replay_score: .', arguments=arguments)
+
+    def test_all_faults_of_the_settings_are_told_at_once(self):
+        self.check_refused(WRONG_USAGE, 'no_such', 'z_max', 'decimation', arguments=[
+            self.folder.name, '--report', self.report, '--set', 'no_such=1', '--set', 'z_max=far', '--set', 'decimation=0'])
+
+    def test_a_setting_does_not_swallow_the_input(self):
+        self.check_refused(FAILED, 'no-such-recording', arguments=['--report', self.report, '--set', 'th_d=0.3', 'no-such-recording'])
+
+    def test_what_cannot_be_done_is_one_sentence(self):
+        for sentence, arguments in [('no-such-recording', ['no-such-recording', '--report', self.report]),
+                                    ('report.*--report', [self.folder.name, '--report', '/proc/no-such-folder']),
+                                    ('--live is not available yet', [self.folder.name, '--report', self.report, '--live']),
+                                    ('no-such.yaml', [self.folder.name, '--report', self.report, '--config', 'no-such.yaml'])]:
+            with self.subTest(arguments=arguments):
+                self.check_refused(FAILED, sentence, arguments=arguments)
+
+    def test_help_and_parameters_need_nothing_else(self):
+        usage = run('--help')
+        self.assertEqual((usage.returncode, usage.stderr), (DONE, ''))
+        for option in ('--report --config --set --first --last --stride --depth-topic --info-topic --color-topic --world-frame '
+                       '--octomap-resolution --no-exact --threads --sweep --live --parameters').split():
+            self.assertIn(option, usage.stdout)
+        table = run('--parameters')
+        self.assertEqual((table.returncode, table.stderr), (DONE, ''))
+        self.assertIn('th_d', table.stdout)
+        self.assertIn('recent_view_angle', table.stdout)
+
+
+class SyntheticRoom(unittest.TestCase):
+    """One run with everything on, looked at by many tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.room = os.path.join(cls.folder.name, 'room')
+        subprocess.run([MAKE_SYNTHETIC, cls.room, '--frames', str(FRAMES)], check=True, stdout=subprocess.DEVNULL)
+        cls.report = os.path.join(cls.folder.name, 'a new', 'report')
+        cls.result = run(cls.room, '--report', cls.report, '--set', 'decimation=8', '--octomap-resolution', 0.04, '--threads', 2,
+                         '--sweep', 'th_d=0.2:0.4:2', cwd='/')
+
+    def setUp(self):
+        self.assertEqual(self.result.returncode, DONE, self.result.stderr)
+
+    def test_summary_agrees_with_the_map(self):
+        summary, surfels = read_json(self.report), read_surfels(self.report)
+        self.assertEqual(summary['input'], {'path': self.room, 'frames': FRAMES, 'skipped': 0})
+        self.assertGreater(len(surfels), 10000)
+        self.assertEqual(summary['surfels']['total'], len(surfels))
+        self.assertEqual(summary['surfels']['occupied'], int((surfels['label'] == 1).sum()))
+        self.assertEqual(summary['surfels']['frontier'], int((surfels['label'] == 0).sum()))
+        self.assertGreater(min(summary['surfels']['occupied'], summary['surfels']['frontier']), 0)
+        self.assertGreaterEqual(summary['surfels']['map_bytes'], 16 * len(surfels))
+        self.assertEqual(summary['octomap']['surfels'], len(read_surfels(self.report, 'octomap.ply')))
+        self.assertEqual((summary['config']['decimation'], summary['config']['threads']), (8, 2))
+
+    def test_shares_are_shares(self):
+        summary = read_json(self.report)
+        exact, octomap = summary['exact'], summary['octomap']
+        for name, share in {**exact, 'fdr': octomap['fdr'], 'for': octomap['for']}.items():
+            self.assertTrue(0 <= share <= 1, (name, share))
+        self.assertAlmostEqual(exact['right'] + exact['buried'] + exact['floating'] + exact['flipped'], 1, places=9)
+        self.assertAlmostEqual(octomap['fdr'], octomap['fp'] / summary['surfels']['total'], places=12)
+        self.assertAlmostEqual(octomap['for'], octomap['fn'] / octomap['surfels'], places=12)
+        self.assertGreater(exact['right'], 0.5)
+        self.assertLess(exact['miss_5cm'], 0.1)
+
+    def test_frames_agree_with_the_summary(self):
+        summary, rows = read_json(self.report), read_rows(self.report)
+        self.assertEqual(len(rows), FRAMES)
+        stages = list(summary['time_ms']['stages'])
+        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms'])
+        warm = [float(row['total']) for row in rows[5:]]
+        self.assertAlmostEqual(summary['time_ms']['mean'], sum(warm) / len(warm), places=9)
+        self.assertEqual(summary['time_ms']['median'], sorted(warm)[len(warm) // 2])
+        self.assertEqual(summary['time_ms']['max'], max(warm))
+        self.assertEqual(int(rows[-1]['surfels']), summary['surfels']['total'])
+        stamps = [float(row['stamp']) for row in rows]
+        self.assertEqual(stamps, sorted(set(stamps)))
+        self.assertGreater(summary['memory_mb']['peak_rss'], summary['surfels']['map_bytes'] / 1e6)
+
+    def test_verdicts_are_those_of_the_score(self):
+        verdicts = numpy.fromfile(os.path.join(self.report, 'verdicts.bin'), dtype=numpy.uint8)
+        summary = read_json(self.report)
+        self.assertEqual(len(verdicts), summary['surfels']['total'])
+        for code, name in enumerate(['right', 'buried', 'floating', 'flipped']):
+            self.assertAlmostEqual((verdicts == code).mean(), summary['exact'][name], places=9)
+
+    def test_sweep_has_a_point_a_value(self):
+        sweep = read_json(self.report, 'sweep.json')
+        self.assertEqual(sweep['parameter'], 'th_d')
+        self.assertEqual([point['value'] for point in sweep['values']], [0.2, 0.4])
+        summary = read_json(self.report)
+        self.assertEqual(sweep['values'][1]['exact'], summary['exact'])  # 0.4 is the configured value, and the map is the same every time
+        self.assertEqual(sweep['values'][1]['octomap']['fdr'], summary['octomap']['fdr'])
+        self.assertNotEqual(sweep['values'][0]['surfels'], sweep['values'][1]['surfels'])
+
+    def test_page_is_self_contained(self):
+        with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+            page = file.read()
+        sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+        self.assertTrue(all(source.startswith('data:image/') for source in sources), sources)
+        kinds = [source.split(';')[0] for source in sources]
+        self.assertEqual(kinds.count('data:image/png'), 4)  # map and OctoMap, from outside and inside
+        self.assertEqual(kinds.count('data:image/svg+xml'), 3)  # time, size, sweep
+        self.assertIn(f"{read_json(self.report)['surfels']['total']:,}".replace(',', '\u202f'), page)
+
+    def test_what_is_switched_off_is_absent_and_nothing_old_stays(self):
+        report = os.path.join(self.folder.name, 'reused')
+        os.mkdir(report)
+        for name in ('octomap.ply', 'sweep.json', 'verdicts.bin'):
+            with open(os.path.join(report, name), 'w', encoding='utf-8') as file:
+                file.write('of an earlier run')
+        result = run(self.room, '--report', report, '--set', 'decimation=8', '--octomap-resolution', 0, '--no-exact', '--first', 2,
+                     '--last', 8, '--stride', 3)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertEqual(sorted(os.listdir(report)), ['frames.csv', 'report.html', 'summary.json', 'surfels.ply', 'trajectory.txt'])
+        summary = read_json(report)
+        self.assertEqual(summary['input']['frames'], 3)
+        self.assertNotIn('octomap', summary)
+        self.assertNotIn('exact', summary)
+        self.assertNotIn('octomap_ms', read_rows(report)[0])
+        self.assertEqual(read_surfels(report).size, summary['surfels']['total'])
+
+    def test_report_of_an_incomplete_folder_is_refused(self):
+        script = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'scripts', 'replay_report.py')
+        result = subprocess.run([script, self.room], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, FAILED)
+        self.assertRegex(result.stderr, r'^replay_report: [^\n]*summary\.json[^\n]*\n$')
+
+    def test_nothing_usable_is_an_error(self):
+        result = run(self.room, '--report', os.path.join(self.folder.name, 'nothing'), '--first', FRAMES + 5)
+        self.assertEqual(result.returncode, FAILED, result.stderr)
+        self.assertRegex(result.stderr, r'^replay_score: [^\n]*room[^\n]*\n$')
+
+    def start_and_interrupt(self, report):
+        """With an OctoMap so fine that the run would take minutes."""
+        process = subprocess.Popen([PROGRAM, self.room, '--report', report, '--no-exact', '--octomap-resolution', '0.01'],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + 60
+        while not os.path.exists(report) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        return process
+
+    def test_second_interrupt_ends_at_once(self):
+        process = self.start_and_interrupt(os.path.join(self.folder.name, 'ended'))
+        time.sleep(0.05)  # two signals that wait at the same time are one
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=5)
+        self.assertEqual(process.returncode, -signal.SIGINT)
+
+    def test_interrupt_keeps_what_was_done(self):
+        report = os.path.join(self.folder.name, 'interrupted')
+        process = self.start_and_interrupt(report)
+        _, errors = process.communicate(timeout=200)
+        self.assertEqual(process.returncode, DONE, errors)
+        frames = read_json(report)['input']['frames']
+        self.assertTrue(1 <= frames < FRAMES, frames)
+        self.assertIn(f'Stopped after {frames} frame', errors)
+        self.assertEqual(len(read_rows(report)), frames)
+        self.assertEqual(len(read_surfels(report)), read_json(report)['surfels']['total'])
+        self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
+
+
+if __name__ == '__main__':
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    PROGRAM, MAKE_SYNTHETIC = map(os.path.abspath, sys.argv[1:])
+    unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,244 @@
+/// The kernels of creation: the filter of new surfels, and where and how they are made.
+
+#include <gtest/gtest.h>
+
+#include "stages/reference_surfels.hpp"
+#include "stages/reference_views.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+/// Unit vectors from voxel v to those of the 26 around it that have C~ = 1.
+std::vector<Vector3d> directions(const Nuvg& grid, const Field<char>& observed, int i, int j, int k) {
+  std::vector<Vector3d> found;
+  for (int di = -1; di <= 1; ++di)
+    for (int dj = -1; dj <= 1; ++dj)
+      for (int dk = -1; dk <= 1; ++dk) {
+        if (di == 0 && dj == 0 && dk == 0) continue;
+        if (!observed.contains(i + di, j + dj, k + dk) || !observed(i + di, j + dj, k + dk)) continue;
+        found.push_back((grid.center_of(i + di, j + dj, k + dk) - grid.center_of(i, j, k)).normalized());
+      }
+  return found;
+}
+
+Vector3d sum_of_directions(const Nuvg& grid, const Field<char>& observed, int i, int j, int k) {
+  Vector3d sum = Vector3d::Zero();
+  for (const Vector3d& direction : directions(grid, observed, i, j, k)) sum += direction;
+  return sum;
+}
+
+void check_filter(const Camera& camera, double observed_density, double known_density) {
+  SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
+  Random random(1);
+  const Nuvg grid(camera.intrinsics, camera.config);
+  StagesProbe probe(camera.config);
+  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
+  const Field<char> observed = random_field(probe.grid(), observed_density, random);
+  const Field<char> known = random_field(probe.grid(), known_density, random);
+  Field<char> candidates = random_field(probe.grid(), 0.5, random);
+  for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
+  probe.set_observed(observed);
+  probe.set_filtered(known);
+  probe.set_candidates(candidates);
+  probe.stages().filter_candidates();
+  Field<Truth> expected = grid.field(Truth::no);
+  for_each_voxel(candidates, [&](int i, int j, int k) {
+    if (!candidates(i, j, k) || known(i, j, k)) return;
+    expected(i, j, k) = !less(sum_of_directions(grid, observed, i, j, k).norm(), 0.01, 1e-4);
+  });
+  expect_equal("candidates left", expected, probe.candidates());
+}
+
+TEST(StageCreation, FilterOfRandomCandidates) {
+  for (const Camera& camera : cameras())
+    for (const double density : {0.03, 0.5}) check_filter(camera, density, 0.3);
+}
+
+TEST(StageCreation, FilterWithNothingObservedOrAllKnown) {
+  const Camera camera = cameras().front();
+  check_filter(camera, 0, 0);
+  check_filter(camera, 0.5, 0);
+  check_filter(camera, 0.5, 1);
+}
+
+/// Two observed voxels on opposite sides cancel; a third one decides.
+TEST(StageCreation, OppositeDirectionsMakeNoSurfel) {
+  const Camera camera = cameras().front();
+  Random random(1);
+  StagesProbe probe(camera.config);
+  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
+  Field<char> observed(probe.grid(), 0), candidates(probe.grid(), 0);
+  observed(3, 4, 5) = observed(5, 4, 5) = 1;  // in the cuboid, where opposite directions cancel exactly
+  observed(9, 4, 5) = observed(11, 4, 5) = observed(10, 5, 5) = 1;
+  candidates(4, 4, 5) = candidates(10, 4, 5) = 1;
+  probe.set_observed(observed);
+  probe.set_filtered(Field<char>(probe.grid(), 0));
+  probe.set_candidates(candidates);
+  probe.stages().filter_candidates();
+  candidates(4, 4, 5) = 0;
+  expect_equal("candidates left", candidates, probe.candidates());
+}
+
+struct Scene {
+  Camera camera;
+  Nuvg grid;
+  std::vector<SeenView> kept;
+  SeenView current;
+  Field<char> observed;
+  std::vector<Vector3i> voxels;  ///< of the candidates, in the order of their numbers
+};
+
+/// Distance of the point before a new surfel where known space is expected: 7/4 r.
+double front_distance(const Scene& scene, const Vector3d& center) { return 1.75 * std::sqrt(3.0) / 2 * scene.grid.voxel_size(center.z()); }
+
+Truth current_view_knows(const Scene& scene, const Vector3d& p_camera) { return camera_knows(scene.current.image, p_camera); }
+
+/// Does this view know the space before a new surfel with such a normal?
+Truth has_known_front(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
+  const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z());
+  return current_view_knows(scene, center + front_distance(scene, center) * normal);
+}
+
+/// May this be the normal? It is the mean direction; where this view does not know the space before it, the direction nearest to the mean
+/// of those to single observed voxels that have it.
+bool is_normal(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
+  constexpr double kTolerance = 1e-3;
+  const std::vector<Vector3d> all = directions(scene.grid, scene.observed, v.x(), v.y(), v.z());
+  const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v.x(), v.y(), v.z()).normalized();
+  const auto has_front = [&](const Vector3d& n) { return has_known_front(scene, v, n); };
+  double certain = -2;  // cosine between the mean and the nearest direction that certainly has known space before it
+  for (const Vector3d& direction : all)
+    if (has_front(direction) == Truth::yes && direction.dot(mean) > -1 + 1e-5)  // the opposite is no choice
+      certain = std::max(certain, direction.dot(mean));
+  if ((normal - mean).norm() < kTolerance && (has_front(mean) != Truth::no || certain < -1)) return true;
+  if (has_front(mean) == Truth::yes) return false;
+  for (const Vector3d& direction : all)
+    if ((normal - direction).norm() < kTolerance && has_front(direction) != Truth::no && direction.dot(mean) > certain - kTolerance)
+      return true;
+  return false;
+}
+
+/// Where a new surfel may stand: in its voxel, moved towards what is known or not at all, and not known itself.
+/// @return how far it was moved [voxel]
+double check_place(const Scene& scene, const Vector3i& v, const Vector3d& normal, const Vector3d& p) {
+  const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z()), moved = p - center;
+  const Voxel voxel = voxel_of(scene.grid.to_grid(p), 1e-3);
+  EXPECT_TRUE(voxel.open || voxel.index == v) << "not in its voxel";
+  const double size = scene.grid.voxel_size(center.z());
+  EXPECT_GE(moved.dot(normal), -1e-3 * size) << "moved away from the boundary";
+  EXPECT_LT((moved - moved.dot(normal) * normal).norm(), 1e-3 * size) << "moved sideways";
+
+  const auto known = [&](const Vector3d& q) {
+    return current_view_knows(scene, q) || any_knows(scene.kept, scene.current.T_world_camera * q);
+  };
+  if (known(center) == Truth::no) {
+    EXPECT_TRUE(known(p) != Truth::yes) << "moved into known space";
+  }
+  const Vector3d front = front_distance(scene, center) * normal;
+  if (current_view_knows(scene, center + front) == Truth::yes) {
+    EXPECT_TRUE(current_view_knows(scene, p + front) != Truth::no) << "lost the known space before it";
+  }
+  return moved.norm() / size;
+}
+
+Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& random) {
+  Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
+  const Eigen::Isometry3d T_world_start = random.pose(2, 3);
+  for (int frame = 0; frame < 3; ++frame) {
+    scene.kept.push_back({random_image(camera, Content::mixed, random), T_world_start * random.pose(0.3, 0.4)});
+    probe.views().set_current(scene.kept.back().image, scene.kept.back().T_world_camera);
+    EXPECT_TRUE(probe.views().keep_current());
+  }
+  scene.current = {random_image(camera, Content::all_valid, random), T_world_start};
+  probe.stages().begin_frame(scene.current.image, T_world_start, 5);
+  scene.observed = random_field(probe.grid(), 0.2, random);
+  probe.stages().select_in_view();
+  probe.stages().split_surfels();
+  probe.stages().settle_by_recent_views();  // sends the views
+  Field<char> candidates = random_field(probe.grid(), density, random);
+  for_each_voxel(candidates, [&](int i, int j, int k) {
+    if (scene.observed(i, j, k) || sum_of_directions(scene.grid, scene.observed, i, j, k).norm() < 0.05) candidates(i, j, k) = 0;
+  });
+  probe.set_observed(scene.observed);
+  probe.set_candidates(candidates);
+  probe.set_removed_bits(std::vector<std::uint64_t>((probe.in_view() + 63) / 64, 0));
+  const int words_k = (scene.grid.size_k + 63) / 64;
+  for (int j = 0; j < scene.grid.size_j; ++j)
+    for (int w = 0; w < words_k; ++w)
+      for (int i = 0; i < scene.grid.size_i; ++i)
+        for (int k = 64 * w; k < std::min(64 * (w + 1), scene.grid.size_k); ++k)
+          if (candidates(i, j, k)) scene.voxels.emplace_back(i, j, k);
+  return scene;
+}
+
+/// @return how many of the new surfels were moved
+std::size_t check_creation(Camera camera, int old_surfels, double density, bool slide = true) {
+  SCOPED_TRACE(camera.name + ", " + std::to_string(old_surfels) + " old surfels, density " + std::to_string(density));
+  camera.config.slide_to_boundary = slide;
+  Random random(2);
+  StagesProbe probe(camera.config);
+  const Nuvg grid(camera.intrinsics, camera.config);
+  probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), old_surfels, 2, 2, random), 1);
+  if (old_surfels > 10) probe.kill({7, 2, 9});
+  const Scene scene = prepare(camera, probe, density, random);
+  const std::vector<std::uint32_t> in_view = probe.in_view_slots();
+  EXPECT_EQ(probe.stages().remove_surfels(), 0u);
+  const std::vector<std::uint32_t> slots = probe.new_slots(scene.voxels.size());
+  const std::size_t before = probe.map().size();
+
+  EXPECT_EQ(probe.stages().create_surfels(), scene.voxels.size());
+  EXPECT_EQ(probe.map().size(), before + scene.voxels.size());
+  std::vector<std::uint32_t> in_view_after = in_view;
+  in_view_after.insert(in_view_after.end(), slots.begin(), slots.end());
+  EXPECT_TRUE(probe.in_view_slots() == in_view_after);
+  std::vector<Surfel> by_slot(probe.map().slots());
+  const std::vector<Surfel> created = probe.map().changes(4).updated;
+  EXPECT_EQ(created.size(), scene.voxels.size());
+  for (const Surfel& surfel : created) by_slot[surfel.id] = surfel;
+
+  std::size_t moved = 0;
+  for (std::size_t n = 0; n < scene.voxels.size(); ++n) {
+    const Vector3i v = scene.voxels[n];
+    SCOPED_TRACE(voxel_text(v.x(), v.y(), v.z()));
+    const Surfel& surfel = by_slot[slots[n]];
+    const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
+    const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
+    EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();
+    const Truth ragged = !has_known_front(scene, v, sum_of_directions(grid, scene.observed, v.x(), v.y(), v.z()).normalized());
+    if (ragged != Truth::open) {
+      EXPECT_EQ(probe.attributes(slots[n]), ragged == Truth::yes ? SURFEL_ALIVE | SURFEL_RAGGED : SURFEL_ALIVE);
+    }
+    const double size = grid.voxel_size(grid.center_of(v.x(), v.y(), v.z()).z());
+    EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, 1e-5 * size);
+    EXPECT_EQ(surfel.label, Label::kFrontier);
+    EXPECT_TRUE((surfel.rgb == std::array<std::uint8_t, 3>{0, 0, 0}));
+    moved += check_place(scene, v, normal, p) > 1e-3;
+  }
+  return moved;
+}
+
+TEST(StageCreation, RandomCandidates) {
+  std::size_t moved = 0;
+  for (const Camera& camera : cameras()) moved += check_creation(camera, 0, 0.01);
+  EXPECT_TRUE(moved > 50 || small_tests()) << "nothing was moved";
+  EXPECT_GT(moved, 0u);
+}
+
+TEST(StageCreation, AtVoxelCentersIfSoConfigured) {
+  for (const Camera& camera : cameras()) EXPECT_EQ(check_creation(camera, 0, 0.01, false), 0u);
+}
+
+TEST(StageCreation, FreeSlotsFirst) { check_creation(cameras().front(), 20, 0.05); }
+
+TEST(StageCreation, NoCandidates) { check_creation(cameras().front(), 20, 0); }
+
+TEST(StageCreation, MoreSurfelsThanTheMapHasRoomFor) {
+  const Camera camera = small_tests() ? cameras().front() : make_camera(40, 30, 39.1, 37.3, 127);
+  check_creation(camera, 0, 1);
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,125 @@
+/// The kernel of labels and colours against the columns of section 5, one surfel at a time.
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "stages/reference_surfels.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+struct Scene {
+  Camera camera;
+  Nuvg grid;
+  WorkingImage image;
+  Eigen::Isometry3d T_world_camera;
+};
+
+/// Surfels around the ends of the columns, and some anywhere.
+std::vector<Surfel> surfels_near_surfaces(const Scene& scene, int count, Random& random) {
+  std::vector<Surfel> surfels = random_surfels(scene.grid, scene.T_world_camera, count, 2, 2, random);
+  for (Surfel& surfel : surfels) {
+    if (random.chance(0.2)) continue;
+    const int s = random.whole(-1, scene.camera.intrinsics.width), t = random.whole(-1, scene.camera.intrinsics.height);
+    const bool inside = s >= 0 && t >= 0 && s < scene.camera.intrinsics.width && t < scene.camera.intrinsics.height;
+    const double d = inside ? std::abs(scene.image.depth[t * scene.camera.intrinsics.width + s]) : 1;
+    const double layer = d > 0 ? scene.grid.to_grid({0, 0, d}).z() : random.uniform(0, scene.grid.size_k);
+    const Vector3d c(s + scene.grid.padding_i + random.uniform(-0.5, 0.5), t + scene.grid.padding_j + random.uniform(-0.5, 0.5),
+                     layer + random.uniform(-2, 3));
+    surfel.position = (scene.T_world_camera * scene.grid.from_grid(c)).cast<float>();
+  }
+  return surfels;
+}
+
+/// Does the surfel lie where its column of observed voxels ends at a measured surface, or in the body behind the surface?
+/// @param pixel  of the column
+Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, const Surfel& surfel, int* pixel) {
+  const Vector3d p = scene.T_world_camera.inverse() * surfel.position.cast<double>();
+  const Voxel voxel = voxel_of(scene.grid.to_grid(p), 1e-3);
+  const Intrinsics& camera = scene.camera.intrinsics;
+  const int s = voxel.index.x() - scene.grid.padding_i, t = voxel.index.y() - scene.grid.padding_j, k = voxel.index.z();
+  *pixel = t * camera.width + s;
+  if (voxel.open) return Truth::open;
+  if (s < 0 || t < 0 || s >= camera.width || t >= camera.height || k <= scene.grid.k_min) return Truth::no;
+  const double d = scene.image.depth[*pixel];
+  if (d <= 0) return Truth::no;  // no measurement, or nothing was met
+  const auto observed = [&](int layer) { return layer >= scene.grid.k_min && layer < scene.grid.size_k && layer_depth[layer] < d; };
+  const Truth in_body = !less(p.z(), d, 1e-5) && !less(d + scene.camera.config.surface_depth, p.z(), 1e-5);
+  return truth(observed(k - 1) && !observed(k)) || in_body;
+}
+
+/// @return how many surfels lie at surfaces
+std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before, std::uint32_t frame) {
+  std::map<std::uint32_t, Surfel> after, changed;
+  for (const Surfel& surfel : probe.map().download()) after[surfel.id] = surfel;
+  for (const Surfel& surfel : probe.map().changes(frame - 1).updated) changed[surfel.id] = surfel;
+  EXPECT_EQ(after.size(), before.size());
+  const std::vector<float> layer_depth = probe.layer_depth();
+  Comparison occupied("occupied"), colored("colour taken"), told("change told");
+  std::size_t at_surfaces = 0;
+  for (const Surfel& surfel : before) {
+    const auto place = [&] { return "surfel " + std::to_string(surfel.id); };
+    int pixel;
+    const Truth at_surface = is_at_surface(scene, layer_depth, surfel, &pixel);
+    const bool was_occupied = surfel.label == Label::kOccupied, was_colored = surfel.rgb != std::array<std::uint8_t, 3>{0, 0, 0};
+    const Surfel& actual = after.at(surfel.id);
+    const Truth takes_color = at_surface && truth(!was_colored && !scene.image.color.empty());
+    occupied.add(truth(was_occupied) || at_surface, actual.label == Label::kOccupied, place);
+    colored.add(takes_color, actual.rgb != surfel.rgb, place);
+    told.add(takes_color || (at_surface && truth(!was_occupied)), changed.count(surfel.id) > 0, place);
+    EXPECT_TRUE(actual.position == surfel.position && actual.normal == surfel.normal && actual.radius == surfel.radius) << place();
+    at_surfaces += at_surface == Truth::yes;
+    if (takes_color != Truth::yes) continue;
+    const std::uint32_t rgb = scene.image.color[pixel];
+    for (int channel = 0; channel < 3; ++channel) EXPECT_EQ(actual.rgb[channel], rgb >> (8 * channel) & 0xff) << place();
+  }
+  return at_surfaces;
+}
+
+std::size_t check(Camera camera, Content content, int count, bool with_color, double surface_depth) {
+  SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels" + (with_color ? ", colour" : "") + ", surface depth " +
+               std::to_string(surface_depth));
+  camera.config.surface_depth = surface_depth;
+  Random random(static_cast<unsigned>(count));
+  Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), random_image(camera, content, random), random.pose(2, 3)};
+  if (with_color)
+    for (std::size_t pixel = 0; pixel < scene.image.depth.size(); ++pixel) scene.image.color.push_back((random.bits() & 0xffffff) | 1);
+  StagesProbe probe(camera.config);
+  probe.map().replace(surfels_near_surfaces(scene, count, random), 1);
+  if (count > 10) probe.kill({1, 8, 9});
+  const std::vector<Surfel> before = probe.map().download();
+  probe.stages().begin_frame(scene.image, scene.T_world_camera, 4);
+  probe.stages().observe_space();
+  std::vector<std::uint32_t> slots;  // those of dead surfels as well: removed ones are still listed
+  for (int slot = 0; slot < count; ++slot) slots.push_back(slot);
+  probe.set_in_view_slots(slots);
+  probe.stages().label_surfels();
+  return compare(scene, probe, before, 4);
+}
+
+TEST(StageLabels, RandomSurfels) {
+  std::size_t at_surfaces = 0;
+  for (const Camera& camera : cameras())
+    for (const bool with_color : {false, true}) {
+      const int count = small_tests() ? 200 : 1500;
+      check(camera, Content::mixed, count, with_color, 0.03);
+      at_surfaces += check(camera, Content::all_valid, count, with_color, 0.03);
+      EXPECT_EQ(check(camera, Content::all_invalid, count, with_color, 0.03), 0u);
+    }
+  EXPECT_GT(at_surfaces, small_tests() ? 5u : 50u) << "nothing was tested";
+}
+
+TEST(StageLabels, OnlyWhereColumnsEnd) {
+  for (const Camera& camera : cameras()) check(camera, Content::mixed, 500, true, 0);
+}
+
+TEST(StageLabels, NumbersOfSurfels) {
+  for (const int count : {0, 1, 63, 64, 65}) check(cameras().front(), Content::all_valid, count, true, 0.03);
+}
+
+}  // namespace
+}  // namespace frontier_surfels

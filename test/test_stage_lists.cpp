@@ -1,0 +1,61 @@
+/// kernels/13_lists.cl: prefix sums and lists of set bits, exactly.
+
+#include <gtest/gtest.h>
+
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using reference::Random;
+
+/// Around a word, a chunk, what one work item scans alone, and (the last two) a second and a third level of sums.
+std::vector<std::size_t> sizes() {
+  std::vector<std::size_t> sizes = {0, 1, 63, 64, 65, 2047, 2048, 2049};
+  if (reference::small_tests()) return sizes;
+  sizes.insert(sizes.end(), {2112, 100000, 64 * 2048, 64 * 2048 + 1, 64 * 64 * 2048 + 77});
+  return sizes;
+}
+
+TEST(StageLists, PrefixSum) {
+  Random random(1);
+  StagesProbe probe({});
+  for (const std::size_t size : sizes()) {
+    for (const std::uint32_t largest : {0u, 1u, 200u}) {
+      SCOPED_TRACE(std::to_string(size) + " values up to " + std::to_string(largest));
+      std::vector<std::uint32_t> values, expected;
+      std::uint32_t sum = 0, total = 1;
+      for (std::size_t n = 0; n < size; ++n) {
+        values.push_back(random.bits() % (largest + 1));
+        expected.push_back(sum);
+        sum += values.back();
+      }
+      if (size > 0) expected.push_back(sum);
+      const auto actual = probe.scan(values, &total);
+      EXPECT_EQ(total, sum);
+      EXPECT_TRUE(actual == expected);
+    }
+  }
+}
+
+TEST(StageLists, SetBitsInOrder) {
+  Random random(2);
+  StagesProbe probe({});
+  for (const std::size_t size : sizes()) {
+    if (size > 200000) continue;
+    for (const double density : {0.0, 0.02, 0.5, 1.0}) {
+      SCOPED_TRACE(std::to_string(size) + " words, share of set bits " + std::to_string(density));
+      std::vector<std::uint64_t> words(size, 0);
+      std::vector<std::uint32_t> expected;
+      for (std::size_t bit = 0; bit < 64 * size; ++bit) {
+        if (!random.chance(density)) continue;
+        words[bit / 64] |= std::uint64_t{1} << (bit % 64);
+        expected.push_back(static_cast<std::uint32_t>(bit));
+      }
+      EXPECT_TRUE(probe.list_bits(words) == expected);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,77 @@
+/// kernels/2_observed_space.cl against the literal loop over pixels and layers.
+
+#include <gtest/gtest.h>
+
+#include "stages/reference_observed_space.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+void check(const Camera& camera, const WorkingImage& image) {
+  StagesProbe probe(camera.config);
+  probe.stages().begin_frame(image, Eigen::Isometry3d::Identity(), 1);
+  probe.stages().observe_space();
+  const Nuvg grid(camera.intrinsics, camera.config);
+  ASSERT_EQ(probe.grid().size_i, grid.size_i);
+  ASSERT_EQ(probe.grid().size_j, grid.size_j);
+  ASSERT_EQ(probe.grid().size_k, grid.size_k);
+  expect_equal("C~", observed_space(grid, image, probe.layer_depth()), probe.observed());
+}
+
+TEST(StageObservedSpace, LayerDepths) {
+  for (const Camera& camera : cameras()) {
+    SCOPED_TRACE(camera.name);
+    Random random(1);
+    StagesProbe probe(camera.config);
+    probe.stages().begin_frame(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity(), 1);
+    const Nuvg grid(camera.intrinsics, camera.config);
+    const auto depths = probe.layer_depth();
+    for (int k = 0; k < grid.size_k; ++k) EXPECT_NEAR(depths[k], grid.center_of(0, 0, k).z(), 1e-6) << "layer " << k;
+  }
+}
+
+TEST(StageObservedSpace, RandomImages) {
+  for (const Camera& camera : cameras()) {
+    for (const Content content : {Content::mixed, Content::all_valid, Content::all_invalid}) {
+      SCOPED_TRACE(camera.name + ", content " + std::to_string(static_cast<int>(content)));
+      Random random(2);
+      check(camera, random_image(camera, content, random));
+    }
+  }
+}
+
+TEST(StageObservedSpace, OneValidPixelAtATime) {
+  const Camera camera = cameras().front();
+  const int pixels = camera.intrinsics.width * camera.intrinsics.height;
+  for (int pixel = 0; pixel < pixels; ++pixel) {
+    SCOPED_TRACE("pixel " + std::to_string(pixel));
+    Random random(pixel);
+    WorkingImage image = random_image(camera, Content::all_invalid, random);
+    image.depth[pixel] = 0.9F;
+    count_valid_above(image);
+    check(camera, image);
+  }
+}
+
+/// z(k) < d is strict: a depth exactly at a layer's centre does not observe that layer.
+TEST(StageObservedSpace, DepthsExactlyAtLayers) {
+  for (const Camera& camera : cameras()) {
+    SCOPED_TRACE(camera.name);
+    Random random(3);
+    WorkingImage image = random_image(camera, Content::all_valid, random);
+    StagesProbe probe(camera.config);
+    probe.stages().begin_frame(image, Eigen::Isometry3d::Identity(), 1);
+    const std::vector<float> depths = probe.layer_depth();
+    for (float& d : image.depth) {
+      const int k = random.whole(probe.grid().first_pyramid_layer, probe.grid().size_k - 1);
+      d = std::nextafter(depths[k], depths[k] + static_cast<float>(random.whole(-1, 1)));
+    }
+    check(camera, image);
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

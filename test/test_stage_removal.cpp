@@ -1,0 +1,152 @@
+/// The kernels of removal: which surfels go, which voxels the others take, and what becomes of the map.
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "stages/reference_surfels.hpp"
+#include "stages/reference_views.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+struct Expected {
+  std::vector<Truth> removed;
+  Field<Truth> occupied_voxels;
+};
+
+/// Removed: in an observed voxel, or (where that is asked for) with its back side, r / 4 behind it, seen by this frame.
+Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& view, const std::vector<Surfel>& map,
+                        const std::vector<ViewSurfel>& in_view, const Field<char>& observed) {
+  Expected expected = {{}, grid.field(Truth::no)};
+  for (const ViewSurfel& s : in_view) {
+    const Surfel& surfel = map[s.slot];
+    const Voxel voxel = voxel_of(Vector3d(s.i, s.j, s.k), 2e-5);
+    const Vector3i v = voxel.index;
+    if (!grid.contains(v)) {
+      expected.removed.push_back(voxel.open ? Truth::open : Truth::no);
+      continue;
+    }
+    Truth removed = truth(observed(v.x(), v.y(), v.z()));
+    if (config.remove_buried)
+      removed = removed || view_knows(view, (surfel.position - 0.25F * surfel.radius * surfel.normal).cast<double>());
+    if (voxel.open) removed = Truth::open;
+    expected.removed.push_back(removed);
+    Truth& occupied = expected.occupied_voxels(v.x(), v.y(), v.z());
+    occupied = occupied || !removed;
+  }
+  return expected;
+}
+
+/// @return how many were removed
+std::size_t check_marks(Camera camera, Content content, int count, double density, bool remove_buried) {
+  SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels, density " + std::to_string(density) +
+               (remove_buried ? ", buried ones too" : ""));
+  camera.config.remove_buried = remove_buried;
+  Random random(static_cast<unsigned>(count));
+  const Nuvg grid(camera.intrinsics, camera.config);
+  StagesProbe probe(camera.config);
+  const SeenView view = {random_image(camera, content, random), random.pose(2, 3)};
+  probe.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
+  const std::vector<Surfel> map = probe.map().download();
+  probe.stages().begin_frame(view.image, view.T_world_camera, 2);
+  probe.stages().select_in_view();
+  EXPECT_EQ(probe.stages().split_surfels(), 0u);
+  const Field<char> observed = random_field(probe.grid(), density, random);
+  probe.set_observed(observed);
+  probe.set_occupied_voxels(random_field(probe.grid(), 0.5, random));  // what the last frame left must not matter
+
+  probe.stages().mark_removed();
+  const Expected expected = expect_removal(grid, camera.config, view, map, probe.view_surfels(), observed);
+  const std::vector<std::uint64_t> bits = probe.removed_bits();
+  std::size_t removed = 0;
+  {
+    Comparison comparison("removed");
+    for (std::size_t n = 0; n < 64 * bits.size(); ++n) {
+      const bool actual = bits[n / 64] >> (n % 64) & 1;
+      comparison.add(n < expected.removed.size() ? expected.removed[n] : Truth::no, actual,
+                     [=] { return "surfel " + std::to_string(n) + " in view"; });
+      removed += actual;
+    }
+  }
+  expect_equal("voxels with surfels", expected.occupied_voxels, probe.occupied_voxels());
+  return removed;
+}
+
+TEST(StageRemoval, RandomSurfels) {
+  for (const Camera& camera : cameras())
+    for (const Content content : {Content::mixed, Content::all_valid, Content::all_invalid})
+      for (const bool remove_buried : {false, true}) check_marks(camera, content, 300, 0.3, remove_buried);
+}
+
+TEST(StageRemoval, NothingAndEverythingObserved) {
+  const Camera camera = cameras().front();
+  for (const int count : {0, 1, 64, 65, 200}) {
+    EXPECT_EQ(check_marks(camera, Content::mixed, count, 0, false), 0u);
+    const std::size_t removed = check_marks(camera, Content::mixed, count, 1, false);
+    EXPECT_LE(removed, static_cast<std::size_t>(count));
+    EXPECT_TRUE(count < 64 || removed > 0);
+  }
+}
+
+TEST(StageRemoval, BuriedSurfelsGo) {
+  const Camera camera = cameras().front();
+  EXPECT_GT(check_marks(camera, Content::all_valid, 300, 0, true), 5u);
+}
+
+/// The numbers of set bits in the order of words and, in them, of layers.
+std::vector<std::uint32_t> in_order(const Field<char>& bits) {
+  std::vector<std::uint32_t> numbers;
+  const auto words = pack(bits);
+  for (std::size_t bit = 0; bit < 64 * words.size(); ++bit)
+    if (words[bit / 64] >> (bit % 64) & 1) numbers.push_back(static_cast<std::uint32_t>(bit));
+  return numbers;
+}
+
+TEST(StageRemoval, FreesSlotsInOrder) {
+  for (const int count : {0, 1, 64, 65, 300}) {
+    SCOPED_TRACE(std::to_string(count) + " surfels");
+    const Camera camera = cameras().front();
+    Random random(3);
+    const Nuvg grid(camera.intrinsics, camera.config);
+    StagesProbe probe(camera.config);
+    probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), count, 2, 2, random), 1);
+    if (count > 64) probe.kill({3, 60, 4});
+    probe.stages().begin_frame(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity(), 9);
+    probe.stages().select_in_view();
+    probe.stages().split_surfels();
+    std::map<std::uint32_t, Surfel> expected;
+    for (const Surfel& surfel : probe.map().download()) expected[surfel.id] = surfel;
+    std::vector<std::uint32_t> free_list = probe.free_list();
+    const std::vector<std::uint32_t> slots = probe.in_view_slots();
+    std::vector<std::uint64_t> removed((slots.size() + 63) / 64, 0);
+    std::set<std::uint32_t> removed_slots;
+    for (std::size_t n = 0; n < slots.size(); ++n) {
+      if (!random.chance(0.4)) continue;
+      removed[n / 64] |= std::uint64_t{1} << (n % 64);
+      free_list.push_back(slots[n]);
+      removed_slots.insert(slots[n]);
+      expected.erase(slots[n]);
+    }
+    probe.set_removed_bits(removed);
+    const Field<char> candidates = random_field(probe.grid(), 0.05, random);
+    probe.set_candidates(candidates);
+
+    EXPECT_EQ(probe.stages().remove_surfels(), removed_slots.size());
+    EXPECT_TRUE(probe.free_list() == free_list);
+    EXPECT_TRUE(probe.created_voxels() == in_order(candidates));
+    const std::vector<Surfel> left = probe.map().download();
+    ASSERT_EQ(left.size(), expected.size());
+    for (const Surfel& surfel : left) EXPECT_TRUE(expected.count(surfel.id) && same(surfel, expected[surfel.id])) << surfel.id;
+    const Changes changes = probe.map().changes(8);
+    EXPECT_TRUE(changes.updated.empty());
+    EXPECT_TRUE(std::set<std::uint32_t>(changes.removed.begin(), changes.removed.end()) == removed_slots);
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,111 @@
+/// kernels/0_shared.h: host and device lay the structures out alike.
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstring>
+
+#include "stages/test_kernels.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+/// A field of a structure; the same list makes the host's offsets and the device's probe kernel.
+// clang-format off
+#define GRID_FIELDS(F) \
+  F(size_i)            \
+  F(size_j)            \
+  F(size_k)            \
+  F(words_k)           \
+  F(width)             \
+  F(height)            \
+  F(padding_i)         \
+  F(padding_j) F(padding_k) F(first_pyramid_layer) F(fx) F(fy) F(f) F(center_i) F(center_j) F(k_min) F(z_min) F(z_max) F(delta_min)
+#define TRANSFORM_FIELDS(F) F(r00) F(r01) F(r02) F(r10) F(r11) F(r12) F(r20) F(r21) F(r22) F(t0) F(t1) F(t2)
+#define VIEW_FIELDS(F)                                                                                                               \
+  F(T_camera_world.r00)                                                                                                              \
+  F(T_camera_world.r01)                                                                                                              \
+  F(T_camera_world.r02)                                                                                                              \
+  F(T_camera_world.r10)                                                                                                              \
+  F(T_camera_world.r11)                                                                                                              \
+  F(T_camera_world.r12)                                                                                                              \
+  F(T_camera_world.r20)                                                                                                              \
+  F(T_camera_world.r21) F(T_camera_world.r22) F(T_camera_world.t0) F(T_camera_world.t1) F(T_camera_world.t2) F(fx) F(fy) F(cx) F(cy) \
+      F(width) F(height) F(first_pixel) F(padding)
+#define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
+#define LIMITS_FIELDS(F) F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(median_votes)
+// clang-format on
+
+#define NAME(field) #field,
+#define NAMES(FIELDS) std::vector<std::string>({FIELDS(NAME)})
+
+/// A kernel that returns, of a structure passed by value: its size, each field's offset, each field's bits; then the same of an element of
+/// a buffer of them, as the second one.
+std::string probe_source(const std::string& type, const std::vector<std::string>& fields) {
+  const std::string put = "  out[n++] = ";
+  std::string text = "__kernel void probe_" + type + "(__global uint* out, __global const " + type + "* in, const " + type + " value) {\n";
+  text += "  int n = 0;\n  " + type + " copy = value;\n" + put + "(uint)sizeof(" + type + ");\n";
+  for (const auto& field : fields) text += put + "(uint)((__private char*)&copy." + field + " - (__private char*)&copy);\n";
+  for (const auto& field : fields) text += put + "*(__private uint*)&copy." + field + ";\n";
+  for (const auto& field : fields) text += put + "*(__global const uint*)&in[1]." + field + ";\n";
+  return text + "}\n";
+}
+
+TestKernels& probes() {
+  static auto* const kernels =
+      new TestKernels(probe_source("Grid", NAMES(GRID_FIELDS)) + probe_source("Transform", NAMES(TRANSFORM_FIELDS)) +
+                      probe_source("View", NAMES(VIEW_FIELDS)) + probe_source("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS)) +
+                      probe_source("Limits", NAMES(LIMITS_FIELDS)));
+  return *kernels;
+}
+
+template <typename T>
+void check(const std::string& type, const std::vector<std::string>& fields, const std::vector<std::size_t>& offsets) {
+  static_assert(sizeof(T) % 4 == 0);
+  std::vector<T> values(2);
+  std::vector<std::uint32_t> bits(2 * sizeof(T) / 4);
+  for (std::size_t n = 0; n < bits.size(); ++n) bits[n] = 0x3f000000u + 0x1357u * static_cast<std::uint32_t>(n);
+  std::memcpy(values.data(), bits.data(), 2 * sizeof(T));
+
+  ASSERT_EQ(4 * fields.size(), sizeof(T)) << "a field is missing in this test";
+  const auto out = probes().run<cl_uint>(("probe_" + type).c_str(), 1, values, 1 + 3 * fields.size(), values[0]);
+  EXPECT_EQ(out[0], sizeof(T));
+  for (std::size_t n = 0; n < fields.size(); ++n) {
+    EXPECT_EQ(out[1 + n], offsets[n]) << "offset of " << fields[n];
+    EXPECT_EQ(out[1 + fields.size() + n], bits[offsets[n] / 4]) << "value of " << fields[n];
+    EXPECT_EQ(out[1 + 2 * fields.size() + n], bits[(sizeof(T) + offsets[n]) / 4]) << "in a buffer: value of " << fields[n];
+  }
+}
+
+TEST(StageShared, Grid) {
+#define OFFSET(field) offsetof(Grid, field),
+  check<Grid>("Grid", NAMES(GRID_FIELDS), {GRID_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+TEST(StageShared, Transform) {
+#define OFFSET(field) offsetof(Transform, field),
+  check<Transform>("Transform", NAMES(TRANSFORM_FIELDS), {TRANSFORM_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+TEST(StageShared, View) {
+#define OFFSET(field) offsetof(View, field),
+  check<View>("View", NAMES(VIEW_FIELDS), {VIEW_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+TEST(StageShared, ViewSurfel) {
+#define OFFSET(field) offsetof(ViewSurfel, field),
+  check<ViewSurfel>("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS), {VIEW_SURFEL_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+TEST(StageShared, Limits) {
+#define OFFSET(field) offsetof(Limits, field),
+  check<Limits>("Limits", NAMES(LIMITS_FIELDS), {LIMITS_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+}  // namespace
+}  // namespace frontier_surfels

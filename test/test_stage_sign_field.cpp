@@ -1,0 +1,157 @@
+/// kernels/4_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <optional>
+
+#include "stages/reference_paths.hpp"
+#include "stages/reference_sign_field.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+/// The variant of the kernel that the device's type would not choose.
+Commands& other_commands() {
+  static auto* const commands = [] {
+    Device device = test_device();
+    device.is_cpu = !device.is_cpu;
+    return new Commands(device);
+  }();
+  return *commands;
+}
+
+/// A surfel in grid coordinates, seen by the view as it must be there; no cosine is near the threshold.
+ViewSurfel make_view_surfel(const Grid& g, const Limits& limits, const Eigen::Vector3d& c, const Eigen::Vector3d& n, double reach) {
+  const bool pyramid = c.z() >= g.k_min;
+  ViewSurfel s = {};
+  s.i = static_cast<float>(c.x());
+  s.j = static_cast<float>(c.y());
+  s.k = static_cast<float>(c.z());
+  s.reach = static_cast<float>(reach);
+  s.n_x = static_cast<float>(n.x());
+  s.n_y = static_cast<float>(n.y());
+  s.n_z = static_cast<float>(n.z());
+  s.ray_x = pyramid ? (s.i - g.center_i) / g.fx : 0;
+  s.ray_y = pyramid ? (s.j - g.center_j) / g.fy : 0;
+  s.n_k = static_cast<float>(n.dot(Eigen::Vector3d(s.ray_x, s.ray_y, 1).normalized()));
+  for (const float cosine : {s.n_x, s.n_y, s.n_k}) EXPECT_NE(std::abs(cosine), limits.th_d);
+  return s;
+}
+
+/// Surfels in the grid and around it; some are large, as those beyond the grid are not split.
+std::vector<ViewSurfel> random_surfels(const Grid& g, const Limits& limits, int count, Random& random) {
+  std::vector<ViewSurfel> surfels;
+  for (int n = 0; n < count; ++n) {
+    constexpr double kAround = 5;
+    const Eigen::Vector3d c(random.uniform(-kAround, g.size_i + kAround), random.uniform(-kAround, g.size_j + kAround),
+                            random.uniform(-kAround, g.size_k + kAround));
+    surfels.push_back(
+        make_view_surfel(g, limits, c, random.direction(), random.chance(0.1) ? random.uniform(6, 13) : random.uniform(0.6, 5)));
+    surfels.back().ragged = random.chance(0.1);
+  }
+  return surfels;
+}
+
+/// Only the paths through `voxels` must be right.
+void compare(const StagesProbe& probe, const SignField& expected, const Field<char>& voxels) {
+  const char* names[] = {"enter forward", "exit forward", "enter backward", "exit backward", "invalid"};
+  const std::vector<Field<char>> paths = paths_through(voxels);
+  for (int family = 0; family < 3; ++family) {
+    for (int event = EVENT_ENTER_FORWARD; event < EVENT_PLANES; ++event) {
+      Comparison comparison(std::string(names[event]) + ", family " + std::to_string(family));
+      const Field<char> actual = probe.event(family, event);
+      for_each_voxel(actual, [&](int i, int j, int k) {
+        if (!on_path(paths, family, i, j, k)) return;
+        const Truth wanted = event == EVENT_INVALID ? expected.invalid(family)(i, j, k) : expected.event(family, event, i, j, k);
+        comparison.add(wanted, actual(i, j, k), [=] { return voxel_text(i, j, k); });
+      });
+    }
+  }
+}
+
+using MakeSurfels = std::function<std::vector<ViewSurfel>(const Grid&, const Limits&)>;
+
+/// @param candidate_density  only the paths around so many voxels are needed; 1: all
+void check(const Camera& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
+  SCOPED_TRACE(camera.name);
+  std::optional<SignField> expected;
+  for (Commands* commands : {&test_commands(), &other_commands()}) {
+    SCOPED_TRACE(commands->device().is_cpu ? "one work item a tile" : "64 work items a tile");
+    Random random(1);
+    StagesProbe probe(camera.config, *commands);
+    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
+    const std::vector<ViewSurfel> surfels = make_surfels(probe.grid(), probe.limits());
+    if (!expected) expected.emplace(probe.grid(), probe.limits(), surfels);
+    const Field<char> candidates = random_field(probe.grid(), candidate_density, random);
+    probe.need_paths_around(candidates);
+    probe.set_view_surfels(surfels);
+    for (int family = 0; family < 3; ++family)  // what the last frame left must not matter
+      for (int event = 0; event < EVENT_PLANES; ++event) probe.set_event(family, event, random_field(probe.grid(), 0.5, random));
+    probe.stages().compute_sign_field();
+    compare(probe, *expected, around(candidates, 1));
+  }
+}
+
+TEST(StageSignField, RandomSurfels) {
+  for (Camera camera : cameras()) {
+    for (const double th_d : {0.4, 0.174}) {
+      camera.config.th_d = th_d;
+      check(camera, [](const Grid& g, const Limits& limits) {
+        Random random(2);
+        const int voxels = g.size_i * g.size_j * g.size_k;
+        return random_surfels(g, limits, std::clamp(voxels / 400, 60, 200), random);
+      });
+    }
+  }
+}
+
+TEST(StageSignField, AroundFewCandidates) {
+  for (const Camera& camera : cameras()) {
+    const MakeSurfels make = [](const Grid& g, const Limits& limits) {
+      Random random(4);
+      return random_surfels(g, limits, 100, random);
+    };
+    check(camera, make, 0.002);
+    check(camera, make, 0);
+  }
+}
+
+TEST(StageSignField, NoSurfels) {
+  for (const Camera& camera : cameras()) check(camera, [](const Grid&, const Limits&) { return std::vector<ViewSurfel>(); });
+}
+
+/// Thousands of surfels in a few voxels: sums far beyond 16 bits stay exact.
+TEST(StageSignField, Crowd) {
+  check(cameras().front(), [](const Grid& g, const Limits& limits) {
+    Random random(3);
+    std::vector<ViewSurfel> surfels;
+    for (int n = 0; n < (small_tests() ? 300 : 3000); ++n) {
+      const Eigen::Vector3d c(random.uniform(6, 7), random.uniform(6, 7), random.uniform(20, 21));
+      const Eigen::Vector3d n_camera = (Eigen::Vector3d(0.55, -0.5, 0.6) + 0.05 * random.direction()).normalized();
+      surfels.push_back(make_view_surfel(g, limits, c, n_camera, 2));
+    }
+    return surfels;
+  });
+}
+
+/// One surfel at a time across the borders of tiles, words and the grid, along each axis.
+TEST(StageSignField, SingleSurfelsAtBorders) {
+  const Camera camera = small_tests() ? cameras().front() : cameras()[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double at : {-2.6, -0.7, 0.2, 7.4, 8.1, 31.6, 32.2, 63.5, 64.3}) {
+      SCOPED_TRACE("axis " + std::to_string(axis) + ", at " + std::to_string(at));
+      check(camera, [&](const Grid& g, const Limits& limits) {
+        Eigen::Vector3d c(6.3, 6.8, 9.1);
+        c[axis] = at;
+        return std::vector<ViewSurfel>{make_view_surfel(g, limits, c, Eigen::Vector3d(0.5, -0.2, 0.7).normalized(), 1.8)};
+      });
+    }
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,276 @@
+// summary.json, frames.csv, --sweep's text and the progress bar, against values worked out by hand.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <sstream>
+
+#include "replay/progress.hpp"
+#include "replay/summary.hpp"
+#include "replay/sweep.hpp"
+
+namespace frontier_surfels::replay {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::vector<std::string> keys(const ordered_json& object) {
+  std::vector<std::string> result;
+  for (const auto& item : object.items()) result.push_back(item.key());
+  return result;
+}
+
+using Keys = std::vector<std::string>;
+
+/// Frame i takes i + 1 ms, of which stage "sweeps" takes a quarter and "median", in odd frames only, a half; OctoMap 100 times as long.
+FrameRecord frame(int i) {
+  FrameRecord record;
+  record.report.stamp = 1305031102.160407 + i / 30.0;
+  record.report.surfels = 1000 * (i + 1);
+  record.report.created = 1200 + i;
+  record.report.removed = 200 + i;
+  record.report.total_ms = i + 1;
+  record.report.stages = {{"sweeps", (i + 1) / 4.0}};
+  if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
+  record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
+  record.octomap_ms = 100.0 * (i + 1);
+  return record;
+}
+
+std::vector<FrameRecord> frames(int n) {
+  std::vector<FrameRecord> result;
+  for (int i = 0; i < n; ++i) result.push_back(frame(i));
+  return result;
+}
+
+Run run_of(int n) {
+  Run run;
+  run.device = "some device";
+  run.frames = frames(n);
+  run.skipped = {"No pose.", "No depth."};
+  run.statistics = {5000, 3000, 2000, 80000, 64500000};
+  run.peak_rss_mb = 321.5;
+  return run;
+}
+
+Scores some_scores() {
+  Scores scores;
+  scores.octomap = scoring::OctomapScore{4000, 50, 20, 0.01, 0.005};
+  scoring::ExactScore exact;
+  exact.right = 0.94;
+  exact.buried = 0.03;
+  exact.floating = 0.02;
+  exact.flipped = 0.01;
+  exact.miss_2cm = 0.0005;
+  exact.label_ok = 0.98;
+  scores.exact = exact;
+  return scores;
+}
+
+TEST(TimeStatistics, OfFiveValues) {
+  const TimeStatistics time = time_statistics({9, 1, 3, 5, 7});
+  EXPECT_DOUBLE_EQ(time.mean, 5);
+  EXPECT_DOUBLE_EQ(time.median, 5);
+  EXPECT_DOUBLE_EQ(time.p95, 9);
+  EXPECT_DOUBLE_EQ(time.max, 9);
+  EXPECT_NEAR(time.rsd_percent, 100 * std::sqrt(10.0) / 5, 1e-9);  // squares 16 + 4 + 0 + 4 + 16 = 40, over n - 1 = 4
+}
+
+TEST(TimeStatistics, MedianOfAnEvenNumberIsTheMeanOfTheMiddleTwo) { EXPECT_DOUBLE_EQ(time_statistics({8, 1, 2, 4}).median, 3); }
+
+TEST(TimeStatistics, PercentileIsByNearestRank) {
+  std::vector<double> values;
+  for (int i = 20; i >= 1; --i) values.push_back(i);
+  EXPECT_DOUBLE_EQ(time_statistics(values).p95, 19);  // ceil(0.95 * 20) = 19th
+  values.push_back(21);
+  EXPECT_DOUBLE_EQ(time_statistics(values).p95, 20);  // ceil(0.95 * 21) = ceil(19.95) = 20th
+}
+
+TEST(TimeStatistics, OfOneValueAndOfZeros) {
+  const TimeStatistics one = time_statistics({4});
+  EXPECT_DOUBLE_EQ(one.p95, 4);
+  EXPECT_DOUBLE_EQ(one.median, 4);
+  EXPECT_DOUBLE_EQ(one.rsd_percent, 0);
+  EXPECT_DOUBLE_EQ(time_statistics({0, 0, 0}).rsd_percent, 0);
+}
+
+TEST(WarmFrames, LeaveOutTheFirstFiveOnlyOfMoreThanTen) {
+  EXPECT_EQ(warm_frames(frames(10)).size(), 10u);
+  ASSERT_EQ(warm_frames(frames(11)).size(), 6u);
+  EXPECT_DOUBLE_EQ(warm_frames(frames(11)).front().report.total_ms, 6);
+}
+
+TEST(StageNames, StagesThatStartLaterTakeTheirPlace) {
+  std::vector<FrameRecord> records(3);
+  records[0].report.stages = {{"first", 1}, {"last", 1}};
+  records[1].report.stages = {{"first", 1}, {"second", 1}, {"third", 1}, {"last", 1}};
+  records[2].report.stages = {{"zeroth", 1}, {"second", 1}, {"last", 1}, {"after", 1}};
+  EXPECT_EQ(stage_names(records), (Keys{"zeroth", "first", "second", "third", "last", "after"}));
+}
+
+TEST(Summary, HasExactlyTheKeysOfTheInterface) {
+  const Yardsticks yardsticks(Config(), 0.02, true);
+  const ordered_json json = summary_json({"a/folder", {}}, 0.02, run_of(12), yardsticks, some_scores());
+  EXPECT_EQ(keys(json), (Keys{"input", "config", "device", "surfels", "time_ms", "memory_mb", "octomap", "exact"}));
+  EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
+  EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes"}));
+  EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
+  EXPECT_EQ(keys(json["time_ms"]["stages"]), (Keys{"sweeps", "median"}));
+  EXPECT_EQ(keys(json["time_ms"]["stages"]["sweeps"]), (Keys{"mean", "median"}));
+  EXPECT_EQ(keys(json["memory_mb"]), (Keys{"peak_rss", "device"}));
+  EXPECT_EQ(keys(json["octomap"]), (Keys{"resolution", "time_ms", "memory_mb", "surfels", "fp", "fn", "fdr", "for"}));
+  EXPECT_EQ(keys(json["octomap"]["time_ms"]), (Keys{"mean", "median"}));
+  EXPECT_EQ(keys(json["exact"]), (Keys{"right", "buried", "floating", "flipped", "within_1v", "within_2v", "fdr_2cm", "fdr_5cm", "miss_1cm",
+                                       "miss_2cm", "miss_5cm", "label_ok"}));
+}
+
+TEST(Summary, HasTheRunsValues) {
+  const Yardsticks yardsticks(Config(), 0.02, true);
+  const ordered_json json = summary_json({"a/folder", {}}, 0.02, run_of(12), yardsticks, some_scores());
+  EXPECT_EQ(json["input"]["path"], "a/folder");
+  EXPECT_EQ(json["input"]["frames"], 12);
+  EXPECT_EQ(json["input"]["skipped"], 2);
+  EXPECT_EQ(json["surfels"]["total"], 5000);
+  EXPECT_EQ(json["surfels"]["occupied"], 3000);
+  EXPECT_EQ(json["surfels"]["map_bytes"], 80000);
+  // Frames 6 to 12, of 6, 7, ... 12 ms
+  EXPECT_DOUBLE_EQ(json["time_ms"]["mean"], 9);
+  EXPECT_DOUBLE_EQ(json["time_ms"]["max"], 12);
+  EXPECT_DOUBLE_EQ(json["time_ms"]["stages"]["sweeps"]["mean"], 2.25);
+  // Halves of 6, 8, 10, 12 ms, and three frames without this stage
+  EXPECT_DOUBLE_EQ(json["time_ms"]["stages"]["median"]["mean"], 18.0 / 7);
+  EXPECT_DOUBLE_EQ(json["time_ms"]["stages"]["median"]["median"], 3);
+  EXPECT_DOUBLE_EQ(json["memory_mb"]["peak_rss"], 321.5);
+  EXPECT_DOUBLE_EQ(json["memory_mb"]["device"], 64.5);
+  EXPECT_DOUBLE_EQ(json["octomap"]["time_ms"]["median"], 900);
+  EXPECT_DOUBLE_EQ(json["octomap"]["for"], 0.005);
+  EXPECT_EQ(json["octomap"]["fp"], 50);
+  EXPECT_DOUBLE_EQ(json["exact"]["right"], 0.94);
+  EXPECT_DOUBLE_EQ(json["exact"]["miss_2cm"], 0.0005);
+}
+
+TEST(Summary, LeavesOutWhatWasNotMeasured) {
+  const Yardsticks none(Config(), 0, false);
+  const ordered_json json = summary_json({"a", {}}, 0, run_of(3), none, {});
+  EXPECT_FALSE(json.contains("octomap"));
+  EXPECT_FALSE(json.contains("exact"));
+  EXPECT_NE(result_table(json).find("median 2.0 ms"), std::string::npos) << result_table(json);
+}
+
+TEST(Summary, ConfigurationKeepsNamesAndKinds) {
+  Config config;
+  config.th_d = 0.25;
+  const ordered_json json = config_json(config);
+  Keys names;
+  for_each_field(config, [&names](const FieldInfo& info, const auto&) { names.push_back(info.name); });
+  EXPECT_EQ(keys(json), names);
+  EXPECT_DOUBLE_EQ(json["th_d"], 0.25);
+  EXPECT_TRUE(json["decimation"].is_number_integer());
+  EXPECT_TRUE(json["carve_no_return"].is_boolean());
+  EXPECT_TRUE(json["device_type"].is_string());
+}
+
+TEST(FramesCsv, NumbersReadBackExactly) {
+  std::vector<FrameRecord> records = frames(2);
+  records[0].report.total_ms = 1.0 / 3;
+  records[1].report.total_ms = std::nextafter(0.1, 1.0);
+  std::istringstream csv(frames_csv(records));
+  std::string line;
+  ASSERT_TRUE(std::getline(csv, line));
+  EXPECT_EQ(line, "stamp,surfels,created,removed,sweeps,median,total,octomap_ms");
+  for (const FrameRecord& record : records) {
+    ASSERT_TRUE(std::getline(csv, line));
+    std::vector<double> values;
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) values.push_back(std::stod(cell));
+    const Report& report = record.report;
+    const double median = report.stages.size() > 1 ? report.stages[1].ms : 0;
+    const std::vector<double> expected = {report.stamp,
+                                          static_cast<double>(report.surfels),
+                                          static_cast<double>(report.created),
+                                          static_cast<double>(report.removed),
+                                          report.stages[0].ms,
+                                          median,
+                                          report.total_ms,
+                                          *record.octomap_ms};
+    EXPECT_EQ(values, expected) << line;
+  }
+  EXPECT_FALSE(std::getline(csv, line));
+}
+
+TEST(FramesCsv, HasNoOctomapColumnWithoutOctomap) {
+  std::vector<FrameRecord> records = frames(1);
+  records[0].octomap_ms.reset();
+  EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total\n1305031102.160407,1000,1200,200,0.25,1.0\n");
+}
+
+TEST(Trajectory, IsInTumsFormat) {
+  std::istringstream text(trajectory_text({frame(1)}));
+  std::string comment;
+  std::getline(text, comment);
+  EXPECT_EQ(comment.front(), '#');
+  double stamp, x, y, z, qx, qy, qz, qw;
+  ASSERT_TRUE(text >> stamp >> x >> y >> z >> qx >> qy >> qz >> qw);
+  EXPECT_DOUBLE_EQ(stamp, frame(1).report.stamp);
+  EXPECT_DOUBLE_EQ(x, 1);
+  EXPECT_DOUBLE_EQ(y, 0.1);
+  EXPECT_DOUBLE_EQ(z, -2);
+  EXPECT_NEAR(qz, std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(qw, std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(qx, 0, 1e-12);
+  EXPECT_NEAR(qy, 0, 1e-12);
+}
+
+TEST(WriteFile, RefusesAFolderThatIsNotThere) {
+  const std::string path = (std::filesystem::temp_directory_path() / "frontier_surfels_no_such_folder" / "x").string();
+  EXPECT_THROW(write_file(path, "text"), FileError);
+}
+
+TEST(Sweep, ValuesAreEquallySpaced) {
+  const Sweep sweep = parse_sweep("th_d=0.01:0.42:9", {});
+  EXPECT_EQ(sweep.parameter, "th_d");
+  ASSERT_EQ(sweep.configs.size(), 9u);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(sweep.configs[i].th_d, 0.01 + 0.41 * i / 8, 1e-12);
+  EXPECT_DOUBLE_EQ(sweep.configs[8].peak, Config().peak);
+}
+
+TEST(Sweep, WholeNumbersAreRoundedAndNotRepeated) {
+  const Sweep sweep = parse_sweep("recent_views=0:2:5", {});  // 0, 0.5, 1, 1.5, 2
+  ASSERT_EQ(sweep.configs.size(), 3u);
+  EXPECT_EQ(sweep.configs[0].recent_views, 0);
+  EXPECT_EQ(sweep.configs[1].recent_views, 1);
+  EXPECT_EQ(sweep.configs[2].recent_views, 2);
+}
+
+TEST(Sweep, RefusesWhatItCannotDo) {
+  for (const char* text :
+       {"th_d", "th_d=0.1:0.2", "th_d=0.1:0.2:1", "th_d=0.2:0.1:3", "th_d=0.1:nan:3", "th_d=0.1x:0.2:3", "th_d=0.1:0.2:99999",
+        "no_such=0:1:3", "device_type=0:1:3", "carve_no_return=0:1:2", "th_d=0.1:5:3", "decimation=0:4:5"}) {
+    EXPECT_THROW(parse_sweep(text, {}), Error) << text;
+  }
+}
+
+TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
+  const Yardsticks yardsticks(Config(), 0, false);
+  Config config;
+  config.th_d = 0.1;
+  EXPECT_TRUE(yardsticks.fit(config));
+  config.z_max = 2;
+  EXPECT_FALSE(yardsticks.fit(config));
+  config = Config();
+  config.decimation = 8;
+  EXPECT_FALSE(yardsticks.fit(config));
+}
+
+TEST(Progress, ShowsShareRateAndTimeLeft) {
+  EXPECT_EQ(Progress::line("Mapping", 50, 200, "frames", 10),
+            "Mapping  [#######.......................]  25 %  50/200 frames  5/s  0:30 left");
+  EXPECT_EQ(Progress::line("Scoring", 0.5, 1, "", 90), "Scoring  [###############...............]  50 %  1:30 left");
+  EXPECT_EQ(Progress::line("Mapping", 0, 0, "frames", 0), "Mapping  [..............................]   0 %  0/0 frames");
+  EXPECT_EQ(Progress::line("Mapping", 0, 7, "frames", 3), "Mapping  [..............................]   0 %  0/7 frames");
+}
+
+}  // namespace
+}  // namespace frontier_surfels::replay
