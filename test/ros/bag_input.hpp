@@ -1,0 +1,139 @@
+/// Bags, messages and comparisons for the tests of bags.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <stdlib.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontier_surfels/replay/frame_source.hpp"
+
+namespace frontier_surfels::replay {
+
+namespace fs = std::filesystem;
+
+inline std::vector<RecordedFrame> read_all(FrameSource& source) {
+  std::vector<RecordedFrame> frames;
+  while (std::optional<RecordedFrame> frame = source.next()) frames.push_back(std::move(*frame));
+  return frames;
+}
+
+/// Whether two images are the same, NaN included.
+inline bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
+         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+}
+
+/// A folder for bags that is gone after the test.
+class BagTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "bag_source_XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    path_ = (folder_ / "test.bag").string();
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string failure(const SourceOptions& options = {}) const {
+    try {
+      open_source(path_, options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return {};
+  }
+
+  fs::path folder_;
+  std::string path_;
+};
+
+/// Of every image made here, in pixels.
+inline constexpr int kWidth = 4, kHeight = 3;
+
+inline sensor_msgs::Image depth_message(double stamp, std::uint16_t value = 1500) {
+  sensor_msgs::Image image;
+  image.header.stamp = ros::Time(stamp);
+  image.header.frame_id = "camera";
+  image.width = kWidth;
+  image.height = kHeight;
+  image.encoding = "16UC1";
+  image.step = 2 * kWidth;
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    image.data.push_back(static_cast<std::uint8_t>(value & 255));
+    image.data.push_back(static_cast<std::uint8_t>(value >> 8));
+  }
+  return image;
+}
+
+inline sensor_msgs::Image color_message(double stamp, const std::string& encoding, const std::vector<std::uint8_t>& pixel) {
+  sensor_msgs::Image image = depth_message(stamp);
+  image.encoding = encoding;
+  image.step = static_cast<std::uint32_t>(kWidth * pixel.size());
+  image.data.clear();
+  for (int i = 0; i < kWidth * kHeight; ++i) image.data.insert(image.data.end(), pixel.begin(), pixel.end());
+  return image;
+}
+
+inline sensor_msgs::CameraInfo info_message(double stamp, double focal_length = 5) {
+  sensor_msgs::CameraInfo info;
+  info.header.stamp = ros::Time(stamp);
+  info.width = kWidth;
+  info.height = kHeight;
+  info.K = {focal_length, 0, 1.5, 0, focal_length + 1, 1.25, 0, 0, 1};
+  return info;
+}
+
+inline tf2_msgs::TFMessage tf_message(double stamp, const std::string& parent, const std::string& child, double x) {
+  tf2_msgs::TFMessage message;
+  message.transforms.resize(1);
+  message.transforms[0].header.stamp = ros::Time(stamp);
+  message.transforms[0].header.frame_id = parent;
+  message.transforms[0].child_frame_id = child;
+  message.transforms[0].transform.translation.x = x;
+  message.transforms[0].transform.rotation.w = 1;
+  return message;
+}
+
+/// Writes messages at whatever time.
+class Handmade {
+ public:
+  explicit Handmade(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
+
+  template <typename Message>
+  Handmade& add(const std::string& topic, double time, const Message& message) {
+    bag_.write(topic, ros::Time(time), message);
+    return *this;
+  }
+
+  /// As tf's first version wrote it: the same message of another name.
+  Handmade& add_of_old_type(const std::string& topic, double time, const tf2_msgs::TFMessage& message) {
+    namespace traits = ros::message_traits;
+    const ros::M_string header = {
+        {"type", "tf/tfMessage"}, {"md5sum", traits::md5sum(message)}, {"message_definition", traits::definition(message)}};
+    bag_.write(topic, ros::Time(time), message, boost::make_shared<ros::M_string>(header));
+    return *this;
+  }
+
+  /// What every test needs and none is about: a camera that moves 1 m in 1 s from time 10 on.
+  Handmade& add_camera_and_motion() {
+    add("/depth/camera_info", 10, info_message(10));
+    add("/tf", 10, tf_message(10, "world", "camera", 0));
+    return add("/tf", 11, tf_message(11, "world", "camera", 1));
+  }
+
+ private:
+  rosbag::Bag bag_;
+};
+
+}  // namespace frontier_surfels::replay

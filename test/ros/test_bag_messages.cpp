@@ -1,0 +1,132 @@
+/// Single messages of a bag: every encoding of images, and cameras.
+#include <gtest/gtest.h>
+#include <sensor_msgs/CompressedImage.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+#include "replay/bag_messages.hpp"
+#include "ros/bag_input.hpp"
+
+namespace frontier_surfels::replay {
+namespace {
+
+ImageMessage raw(const sensor_msgs::Image& image) { return {boost::make_shared<sensor_msgs::Image>(image), nullptr}; }
+
+ImageMessage compressed(const std::string& format, const cv::Mat& image, const std::vector<float>& header = {},
+                        const char* extension = ".png") {
+  const auto message = boost::make_shared<sensor_msgs::CompressedImage>();
+  message->format = format;
+  cv::imencode(extension, image, message->data);
+  std::vector<std::uint8_t> bytes(4 * header.size());
+  if (!header.empty()) std::memcpy(bytes.data(), header.data(), bytes.size());
+  message->data.insert(message->data.begin(), bytes.begin(), bytes.end());
+  return {nullptr, message};
+}
+
+TEST(DepthMessages, RespectStepAndByteOrder) {
+  sensor_msgs::Image image = depth_message(10);
+  image.step = 11;
+  image.is_bigendian = 1;
+  image.data.assign(image.step * kHeight, 0xff);
+  for (int row = 0; row < kHeight; ++row) {
+    for (int column = 0; column < kWidth; ++column) {
+      image.data[static_cast<std::size_t>(11 * row + 2 * column)] = 4;
+      image.data[static_cast<std::size_t>(11 * row + 2 * column + 1)] = static_cast<std::uint8_t>(10 * row + column);
+    }
+  }
+  for (const char* encoding : {"16UC1", "mono16"}) {
+    image.encoding = encoding;
+    const cv::Mat depth = depth_image(raw(image));
+    ASSERT_EQ(depth.type(), CV_16UC1);
+    EXPECT_EQ(depth.at<std::uint16_t>(0, 0), 1024);
+    EXPECT_EQ(depth.at<std::uint16_t>(2, 3), 1024 + 23);
+  }
+
+  image.encoding = "32FC1";
+  image.step = 4 * kWidth;
+  image.data.clear();
+  for (int i = 0; i < kWidth * kHeight; ++i) image.data.insert(image.data.end(), {0x3f, 0xc0, 0, 0});  // 1.5, big end first
+  const cv::Mat depth = depth_image(raw(image));
+  ASSERT_EQ(depth.type(), CV_32FC1);
+  EXPECT_EQ(depth.at<float>(2, 3), 1.5f);
+}
+
+TEST(DepthMessages, RefuseWhatIsMalformed) {
+  sensor_msgs::Image image = depth_message(10);
+  image.step = 7;  // less than a row
+  image.data.resize(7 * kHeight);
+  EXPECT_THROW(depth_image(raw(image)), BadFrame);
+  image = depth_message(10);
+  image.width = 0;
+  EXPECT_THROW(depth_image(raw(image)), BadFrame);
+  image = depth_message(10);
+  image.width = image.height = image.step = 1u << 16;  // their product is 0 in 32 bits
+  image.data.clear();
+  EXPECT_THROW(depth_image(raw(image)), BadFrame);
+  image = depth_message(10);
+  image.encoding = "rgb8";
+  EXPECT_THROW(depth_image(raw(image)), BadFrame);
+}
+
+TEST(DepthMessages, CompressedOnes) {
+  cv::Mat values(kHeight, kWidth, CV_16UC1, cv::Scalar(2020));
+  values.at<std::uint16_t>(0, 0) = 0;
+  EXPECT_TRUE(same_bytes(depth_image(compressed("png", values)), values));
+  EXPECT_TRUE(same_bytes(depth_image(compressed("16UC1; compressedDepth", values, {0, 0, 0})), values));
+  EXPECT_TRUE(same_bytes(depth_image(compressed("16UC1; compressedDepth png", values, {0, 0, 0})), values));
+
+  const cv::Mat metres = depth_image(compressed("32FC1; compressedDepth", values, {0, 10100, -1010}));
+  ASSERT_EQ(metres.type(), CV_32FC1);
+  EXPECT_TRUE(std::isnan(metres.at<float>(0, 0)));
+  EXPECT_FLOAT_EQ(metres.at<float>(1, 1), 10100.0f / (2020 + 1010));
+
+  EXPECT_THROW(depth_image(compressed("jpeg", cv::Mat(3, 4, CV_8UC3), {}, ".jpg")), BadFrame);
+  EXPECT_THROW(depth_image(compressed("16UC1; compressedDepth rvl", values, {0, 0, 0})), BadFrame);
+  EXPECT_THROW(depth_image(compressed("16UC1; compressedDepth", values)), BadFrame) << "no header: the image is cut";
+  sensor_msgs::CompressedImage empty;
+  EXPECT_THROW(depth_image({nullptr, boost::make_shared<sensor_msgs::CompressedImage>(empty)}), BadFrame);
+}
+
+TEST(ColourMessages, AllOrdersBecomeBgr) {
+  const cv::Vec3b bgr(30, 20, 10);
+  EXPECT_EQ(color_image(raw(color_message(1, "rgb8", {10, 20, 30}))).at<cv::Vec3b>(2, 3), bgr);
+  EXPECT_EQ(color_image(raw(color_message(1, "bgr8", {30, 20, 10}))).at<cv::Vec3b>(2, 3), bgr);
+  EXPECT_EQ(color_image(raw(color_message(1, "rgba8", {10, 20, 30, 99}))).at<cv::Vec3b>(2, 3), bgr);
+  EXPECT_EQ(color_image(raw(color_message(1, "bgra8", {30, 20, 10, 99}))).at<cv::Vec3b>(2, 3), bgr);
+  EXPECT_EQ(color_image(raw(color_message(1, "mono8", {77}))).at<cv::Vec3b>(2, 3), cv::Vec3b(77, 77, 77));
+  EXPECT_EQ(color_image(compressed("bgr8; png compressed bgr8", cv::Mat(3, 4, CV_8UC3, cv::Scalar(30, 20, 10)))).at<cv::Vec3b>(2, 3), bgr);
+  EXPECT_THROW(color_image(raw(color_message(1, "nonsense", {1}))), BadFrame);
+}
+
+TEST(CameraMessages, RectifiedBinnedAndCropped) {
+  sensor_msgs::CameraInfo info = info_message(1);
+  EXPECT_EQ(to_intrinsics(info).fy, 6) << "no P: K";
+  info.width = 640;
+  info.height = 480;
+  info.P = {500, 0, 320, 0, 0, 490, 240, 0, 0, 0, 1, 0};
+  EXPECT_EQ(to_intrinsics(info).fx, 500);
+  EXPECT_EQ(to_intrinsics(info).width, 640);
+
+  info.roi.x_offset = 100;
+  info.roi.y_offset = 40;
+  info.roi.width = 400;
+  info.roi.height = 200;
+  info.binning_x = 4;
+  info.binning_y = 2;
+  const Intrinsics intrinsics = to_intrinsics(info);
+  EXPECT_EQ(intrinsics.fx, 125);
+  EXPECT_EQ(intrinsics.fy, 245);
+  EXPECT_EQ(intrinsics.cx, 55);
+  EXPECT_EQ(intrinsics.cy, 100);
+  EXPECT_EQ(intrinsics.width, 100);
+  EXPECT_EQ(intrinsics.height, 100);
+
+  info.P[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(to_intrinsics(info), BadFrame);
+  EXPECT_THROW(to_intrinsics(sensor_msgs::CameraInfo()), BadFrame);
+}
+
+}  // namespace
+}  // namespace frontier_surfels::replay
