@@ -65,8 +65,8 @@ INLINE bool any_view_knows(__global const View* views, int view_count, __global 
   return false;
 }
 
-// Where in its voxel a surfel stands: slid along its normal until it is near the boundary, in steps of a tenth of a voxel. A step is left in
-// hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
+// Where in its voxel a surfel stands: slid along its normal until it is near the boundary, in steps of a tenth of a voxel. A step is left
+// in hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
 float3 slide_to_boundary(const Grid* g, const View* view, __global const View* views, int view_count, __global const float* depths, int3 v,
                          float3 center, float3 normal) {
   const float size = voxel_size(g, center.z);
@@ -75,11 +75,13 @@ float3 slide_to_boundary(const Grid* g, const View* view, __global const View* v
   int steps = 0;
   while (steps < 4) {
     const float3 next = center + (float)(steps + 1) * step;
-    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next + step)) break;
+    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next) || view_knows(view, depths, next + step)) break;
     if (has_front && !view_knows(view, depths, next + front)) break;
     ++steps;
   }
-  while (steps > 0 && any_view_knows(views, view_count, depths, center + (float)(steps + 1) * step)) --steps;
+  while (steps > 0 && (any_view_knows(views, view_count, depths, center + (float)(steps + 1) * step) ||
+                       any_view_knows(views, view_count, depths, center + (float)steps * step)))
+    --steps;
   return center + (float)steps * step;
 }
 
@@ -88,11 +90,11 @@ float3 slide_to_boundary(const Grid* g, const View* view, __global const View* v
 //       view: this frame's, views[view_count]: the kept ones, both in this frame's camera;  depths: their images
 //   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
 __kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const int slide, const View view,
-                             __global const View* views, const int view_count,
-                             __global const float* depths, __global const float* layer_depth, __global const ulong* observed,
-                             __global const uint* voxels, const uint count, __global float4* position_radius,
-                             __global float4* normal_attributes, __global uint* changed, const uint frame, __global const uint* free_slots,
-                             const uint free_count, const uint slots, __global uint* in_view_slots, const uint in_view) {
+                             __global const View* views, const int view_count, __global const float* depths,
+                             __global const float* layer_depth, __global const ulong* observed, __global const uint* voxels,
+                             const uint count, __global float4* position_radius, __global float4* normal_attributes, __global uint* changed,
+                             const uint frame, __global const uint* free_slots, const uint free_count, const uint slots,
+                             __global uint* in_view_slots, const uint in_view) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;

@@ -2,10 +2,10 @@
 
 // One work item a surfel in view, new ones included.
 //   in  depth, column_end: of 2_observed_space;  color[height][width]: red | green << 8 | blue << 16, if has_color
-__kernel void label_surfels(const Grid g, const Transform T_camera_world, const float surface_depth, __global const float* depth, __global const int* column_end,
-                            __global const uint* color, const int has_color, __global const uint* in_view_slots, const uint count,
-                            __global const float4* position_radius, __global float4* normal_attributes, __global uint* changed,
-                            const uint frame) {
+__kernel void label_surfels(const Grid g, const Transform T_camera_world, const float surface_depth, __global const float* depth,
+                            __global const int* column_end, __global const uint* color, const int has_color,
+                            __global const uint* in_view_slots, const uint count, __global const float4* position_radius,
+                            __global float4* normal_attributes, __global uint* changed, const uint frame) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint slot = in_view_slots[n];

@@ -30,7 +30,8 @@ INLINE float3 to_grid(const Grid* g, float3 p) {
 // F^-1: grid coordinates -> camera frame [m].
 INLINE float3 from_grid(const Grid* g, float3 c) {
   if (c.z < g->k_min) {
-    return (float3)((c.x - g->center_i) * g->z_min / g->fx, (c.y - g->center_j) * g->z_min / g->fy, (c.z - (float)g->padding_k) * g->delta_min);
+    return (float3)((c.x - g->center_i) * g->z_min / g->fx, (c.y - g->center_j) * g->z_min / g->fy,
+                    (c.z - (float)g->padding_k) * g->delta_min);
   }
   const float z = g->z_min * exp((c.z - g->k_min) / g->f);
   return (float3)((c.x - g->center_i) * z / g->fx, (c.y - g->center_j) * z / g->fy, z);

@@ -24,7 +24,8 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
 // One work item a word: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid pixel's ray has its sample of
 // that layer in it, that is, iff there is one in a fixed rectangle of the image.
 //   in  column_end[height][width];  valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
-//       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies there
+//       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies
+//       there
 //   out observed: bit field
 __kernel void observed_space(const Grid g, __global const int* column_end, __global const int* valid_above,
                              __global const ushort2* pixels_i, __global const ushort2* pixels_j, __global ulong* observed) {

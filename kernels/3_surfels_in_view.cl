@@ -1,11 +1,12 @@
 // The surfels that touch the view's grid, and their split - paper 3.4.
 //
-// The map: position_radius[slot] = centre, world frame, and radius [m]; normal_attributes[slot] = normal, world frame, and attributes (0_shared.h)
-// as bits of the fourth component. changed[slot]: number of the frame that changed the slot last.
+// The map: position_radius[slot] = centre, world frame, and radius [m]; normal_attributes[slot] = normal, world frame, and attributes
+// (0_shared.h) as bits of the fourth component. changed[slot]: number of the frame that changed the slot last.
 
 INLINE bool is_alive(float4 normal_attributes) { return (as_uint(normal_attributes.w) & SURFEL_ALIVE) != 0; }
 
-INLINE ViewSurfel place_in_view(const Grid* g, const Transform* T_camera_world, float4 position_radius, float4 normal_attributes, uint slot) {
+INLINE ViewSurfel place_in_view(const Grid* g, const Transform* T_camera_world, float4 position_radius, float4 normal_attributes,
+                                uint slot) {
   const float3 p = transform_point(T_camera_world, position_radius.xyz);
   const float3 n = rotate(T_camera_world, normal_attributes.xyz);
   const float3 c = to_grid(g, p);
@@ -52,10 +53,11 @@ INLINE bool may_reach_grid(const Grid* g, const Limits* limits, float3 p, float 
 
 // One work item a slot, one group a word: which surfels have an ellipsoid that may reach into the grid.
 //   out in_view[ceil(slots / 64)]: bit slot % 64 of word slot / 64
-__kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_in_view(const Grid g, const Limits limits, const Transform T_camera_world,
-                                                                          __global const float4* position_radius,
-                                                                          __global const float4* normal_attributes, const uint slots,
-                                                                          __global ulong* in_view) {
+__kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_in_view(const Grid g, const Limits limits,
+                                                                           const Transform T_camera_world,
+                                                                           __global const float4* position_radius,
+                                                                           __global const float4* normal_attributes, const uint slots,
+                                                                           __global ulong* in_view) {
   __local uchar mark[64];
   const uint slot = get_global_id(0), lane = get_local_id(0);
   mark[lane] = 0;
@@ -108,8 +110,9 @@ INLINE uint new_slot(uint n, __global const uint* free_slots, uint free_count, u
 //   in  offset[count]: prefix sum of count_splits' additional
 //   i/o in_view_slots: count entries, additional ones behind them
 __kernel void split(const Grid g, const Limits limits, __global const ViewSurfel* view_surfels, __global float4* position_radius,
-                    __global float4* normal_attributes, __global uint* changed, const uint frame, __global uint* in_view_slots, const uint count,
-                    __global const uint* offset, __global const uint* free_slots, const uint free_count, const uint slots) {
+                    __global float4* normal_attributes, __global uint* changed, const uint frame, __global uint* in_view_slots,
+                    const uint count, __global const uint* offset, __global const uint* free_slots, const uint free_count,
+                    const uint slots) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const ViewSurfel s = view_surfels[n];

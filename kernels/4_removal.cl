@@ -5,11 +5,11 @@
 //   i/o occupied_voxels: bit field as 32-bit halves, zero before
 //   out removed[ceil(count / 64)]: bit n % 64 of word n / 64 for surfel n in view
 __kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_removed(const Grid g, const View view, const int remove_buried,
-                                                                          __global const float* depths,
-                                                                          __global const ViewSurfel* view_surfels, const uint count,
-                                                                          __global const float4* position_radius,
-                                                                          __global const ulong* observed, __global uint* occupied_voxels,
-                                                                          __global ulong* removed) {
+                                                                           __global const float* depths,
+                                                                           __global const ViewSurfel* view_surfels, const uint count,
+                                                                           __global const float4* position_radius,
+                                                                           __global const ulong* observed, __global uint* occupied_voxels,
+                                                                           __global ulong* removed) {
   __local uchar mark[64];
   const uint n = get_global_id(0), lane = get_local_id(0);
   mark[lane] = 0;

@@ -17,8 +17,8 @@ typedef struct {
   int i[(TILE_I + 2) * TILE_J * PADDED_K];
   int j[TILE_I * (TILE_J + 2) * PADDED_K];
   int k[TILE_I * TILE_J * PADDED_K];
-  int beyond[8];                      // a vector that begins in the last row may end here
-  uint touched[TILE_I * TILE_J];      // bits along k that a surfel reached
+  int beyond[8];                  // a vector that begins in the last row may end here
+  uint touched[TILE_I * TILE_J];  // bits along k that a surfel reached
   uint invalid[3][TILE_I * TILE_J];
 } SignFieldTile;
 
@@ -99,11 +99,11 @@ typedef struct {
   float3 normal, center;  // center: from the tile's first voxel [voxel]
   float2 ray;             // step = (ray, 1)
   float along, in_plane, step_n, step_step;
-  float a;                // of dk^2 in e^2
-  float core;             // (rho / 2)^2
-  int3 sign;              // of g_tau, 0 where the family is invalid near the surfel
-  float3 extent;          // of the ellipsoid [voxel]
-  uint layers;            // of the tile that it reaches
+  float a;        // of dk^2 in e^2
+  float core;     // (rho / 2)^2
+  int3 sign;      // of g_tau, 0 where the family is invalid near the surfel
+  float3 extent;  // of the ellipsoid [voxel]
+  uint layers;    // of the tile that it reaches
 } Footprint;
 
 INLINE Footprint make_footprint(const Limits* limits, const ViewSurfel* s, int3 origin) {
@@ -175,7 +175,8 @@ INLINE void add_to_column(__local SignFieldTile* tile, __local const NeededPaths
 }
 
 // The part of a surfel's ellipsoid that lies in the tile whose first voxel is `origin`.
-INLINE void add_surfel(__local SignFieldTile* tile, __local const NeededPaths* needed, const Limits* limits, const ViewSurfel* s, int3 origin) {
+INLINE void add_surfel(__local SignFieldTile* tile, __local const NeededPaths* needed, const Limits* limits, const ViewSurfel* s,
+                       int3 origin) {
   const Footprint f = make_footprint(limits, s, origin);
   const int first_i = max(ceil_int(f.center.x - f.extent.x), -1), last_i = min(floor_int(f.center.x + f.extent.x), TILE_I);
   const int first_j = max(ceil_int(f.center.y - f.extent.y), -1), last_j = min(floor_int(f.center.y + f.extent.y), TILE_J);
@@ -223,18 +224,14 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
 // One work-group a tile. Tiles without a path to be walked are left as they are.
 //   in  lines: of 6_recent_views;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
 //   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; right on the paths to be walked
-__kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(const Grid g, const Limits limits,
-                                                                                       __global const uint* lines,
-                                                                                       __global const ViewSurfel* view_surfels,
-                                                                                       __global const uint* tile_begin,
-                                                                                       __global const uint* tile_surfels,
-                                                                                       __global uint* events) {
+__kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(
+    const Grid g, const Limits limits, __global const uint* lines, __global const ViewSurfel* view_surfels, __global const uint* tile_begin,
+    __global const uint* tile_surfels, __global uint* events) {
   __local SignFieldTile tile;
   __local NeededPaths needed;
   const int number = get_group_id(0), lane = get_local_id(0);
   const int3 tiles = tiles_of(&g);
-  const int3 origin =
-      (int3)(number % tiles.x * TILE_I, number / tiles.x % tiles.y * TILE_J, number / tiles.x / tiles.y * TILE_K);
+  const int3 origin = (int3)(number % tiles.x * TILE_I, number / tiles.x % tiles.y * TILE_J, number / tiles.x / tiles.y * TILE_K);
   if (lane == 0) load_needed(&needed, &g, lines, origin);
   barrier(CLK_LOCAL_MEM_FENCE);
 
@@ -254,10 +251,12 @@ __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign
     const int i = column / TILE_J, j = column % TILE_J;
     if (origin.x + i >= g.size_i || origin.y + j >= g.size_j) continue;
     __global uint* out = events + 2 * word_index(&g, origin.x + i, origin.y + j, origin.z >> 6) + ((origin.z >> 5) & 1);
-    const uint touched = tile.touched[column] & (uint)bit_run(0, g.size_k - origin.z);
-    write_events(tile.i + ((i + 1) * TILE_J + j) * PADDED_K + 1, TILE_J * PADDED_K, touched, tile.invalid[0][column], peak, out, plane);
-    write_events(tile.j + (i * (TILE_J + 2) + j + 1) * PADDED_K + 1, PADDED_K, touched, tile.invalid[1][column], peak,
+    const uint layers = (uint)bit_run(0, g.size_k - origin.z);  // those that exist
+    const uint touched = tile.touched[column] & layers;
+    write_events(tile.i + ((i + 1) * TILE_J + j) * PADDED_K + 1, TILE_J * PADDED_K, touched, tile.invalid[0][column] & layers, peak, out,
+                 plane);
+    write_events(tile.j + (i * (TILE_J + 2) + j + 1) * PADDED_K + 1, PADDED_K, touched, tile.invalid[1][column] & layers, peak,
                  out + EVENT_PLANES * plane, plane);
-    write_events(tile.k + column * PADDED_K + 1, 1, touched, tile.invalid[2][column], peak, out + 2 * EVENT_PLANES * plane, plane);
+    write_events(tile.k + column * PADDED_K + 1, 1, touched, tile.invalid[2][column] & layers, peak, out + 2 * EVENT_PLANES * plane, plane);
   }
 }

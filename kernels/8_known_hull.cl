@@ -1,20 +1,26 @@
 // Known state hull - supplement C: for each path that enters the grid through a face, the state of the last surfel that it met outside.
 //
-// Six images of keys, one after the other: faces i low, i high [size_j][size_k], j low, j high [size_i][size_k], k low, k high [size_j][size_i].
-// A key is the surfel's distance from the face (bits of a positive float, which sort like the number) with the state in its lowest bit:
-// the smallest key is the nearest surfel, and an unknown one wins a tie. HULL_EMPTY: no surfel.
+// Six images of keys, one after the other: faces i low, i high [size_j][size_k], j low, j high [size_i][size_k], k low, k high
+// [size_j][size_i]. A key is the surfel's distance from the face (bits of a positive float, which sort like the number) with the state in
+// its lowest bit: the smallest key is the nearest surfel, and an unknown one wins a tie. HULL_EMPTY: no surfel.
 
 #define HULL_EMPTY 0xffffffffu
 
 INLINE uint face_offset(const Grid* g, int face) {
   const uint face_i = g->size_j * g->size_k, face_j = g->size_i * g->size_k, face_k = g->size_i * g->size_j;
   switch (face) {
-    case FACE_I_LOW: return 0;
-    case FACE_I_HIGH: return face_i;
-    case FACE_J_LOW: return 2 * face_i;
-    case FACE_J_HIGH: return 2 * face_i + face_j;
-    case FACE_K_LOW: return 2 * (face_i + face_j);
-    default: return 2 * (face_i + face_j) + face_k;
+    case FACE_I_LOW:
+      return 0;
+    case FACE_I_HIGH:
+      return face_i;
+    case FACE_J_LOW:
+      return 2 * face_i;
+    case FACE_J_HIGH:
+      return 2 * face_i + face_j;
+    case FACE_K_LOW:
+      return 2 * (face_i + face_j);
+    default:
+      return 2 * (face_i + face_j) + face_k;
   }
 }
 
@@ -53,14 +59,16 @@ INLINE uint face_key(float position, int size, float entering, float th_d, bool 
   return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
 }
 
-// One work item a slot: surfels beyond a face, and within its range in the other two coordinates (with their own reach as a margin), enter it.
+// One work item a slot: surfels beyond a face, and within its range in the other two coordinates (with their own reach as a margin), enter
+// it.
 //   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
 __kernel void project_hull(const Grid g, const Limits limits, const Transform T_camera_world, __global const float4* position_radius,
                            __global const float4* normal_attributes, const uint slots, __global const uint* lines, __global uint* faces) {
   const uint slot = get_global_id(0);
   if (slot >= slots || !is_alive(normal_attributes[slot])) return;
   const ViewSurfel s = place_in_view(&g, &T_camera_world, position_radius[slot], normal_attributes[slot], slot);
-  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d, s.ragged != 0), key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d, s.ragged != 0);
+  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d, s.ragged != 0),
+             key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d, s.ragged != 0);
   const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d, s.ragged != 0);
   const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
   const float unknown = limits.hull_unknown_scale;
@@ -90,12 +98,18 @@ INLINE bool hull_cell(__global const uint* face, int width, int height, int colu
 INLINE uint hull_word_offset(const Grid* g, int face) {
   const uint face_i = g->size_j * g->words_k, face_j = g->size_i * g->words_k, face_k = g->size_i * g->size_j;
   switch (face) {
-    case FACE_I_LOW: return 0;
-    case FACE_I_HIGH: return face_i;
-    case FACE_J_LOW: return 2 * face_i;
-    case FACE_J_HIGH: return 2 * face_i + face_j;
-    case FACE_K_LOW: return 2 * (face_i + face_j);
-    default: return 2 * (face_i + face_j) + face_k;
+    case FACE_I_LOW:
+      return 0;
+    case FACE_I_HIGH:
+      return face_i;
+    case FACE_J_LOW:
+      return 2 * face_i;
+    case FACE_J_HIGH:
+      return 2 * face_i + face_j;
+    case FACE_K_LOW:
+      return 2 * (face_i + face_j);
+    default:
+      return 2 * (face_i + face_j) + face_k;
   }
 }
 
@@ -113,7 +127,6 @@ __kernel void hull_states(const Grid g, __global const uint* faces, __global ulo
   if (word >= rows * g.words_k) return;
   const int row = word / g.words_k, first = word % g.words_k * 64;
   ulong bits = 0;
-  for (int k = first; k < min(first + 64, g.size_k); ++k)
-    bits |= (ulong)hull_cell(image, g.size_k, rows, k, row) << (k - first);
+  for (int k = first; k < min(first + 64, g.size_k); ++k) bits |= (ulong)hull_cell(image, g.size_k, rows, k, row) << (k - first);
   hull[hull_word_offset(&g, face) + word] = bits;
 }

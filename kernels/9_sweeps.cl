@@ -1,7 +1,8 @@
 // Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family.
 //
-// At each voxel, in this order: invalid or exit -> e = 0; K' |= e; enter (and not invalid) -> e = 1. Along i and j one word carries 64 paths.
-// events: bit fields [3][EVENT_PLANES] of 7_sign_field; hull: 8_known_hull; lines: 6_recent_views: paths without a bit there are not walked.
+// At each voxel, in this order: invalid or exit -> e = 0; K' |= e; enter (and not invalid) -> e = 1. Along i and j one word carries 64
+// paths. events: bit fields [3][EVENT_PLANES] of 7_sign_field; hull: 8_known_hull; lines: 6_recent_views: paths without a bit there are not
+// walked.
 
 INLINE bool is_needed(__global const uint* lines, int word) { return (lines[word] | lines[word + 1]) != 0; }
 
@@ -28,7 +29,8 @@ void sweep_words(__global const ulong* events, size_t plane, int first, int stri
 }
 
 // One work item a word (j, w) of the i faces. First of the three: it sets known, the others add to it.
-__kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
   const int path = get_global_id(0);
   if (path >= g.size_j * g.words_k || !is_needed(lines, 2 * path)) return;
   const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
@@ -37,15 +39,16 @@ __kernel void sweep_i(const Grid g, __global const uint* lines, __global const u
 }
 
 // One work item a word (i, w) of the j faces.
-__kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
   const int path = get_global_id(0);
   if (path >= g.size_i * g.words_k) return;
   const int i = path % g.size_i, w = path / g.size_i;
   if (!is_needed(lines, lines_j(&g, i, w))) return;
   const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
   sweep_words(events + EVENT_PLANES * plane, plane, word_index(&g, i, 0, w), g.size_i * g.words_k, g.size_j,
-              hull[hull_word_offset(&g, FACE_J_LOW) + i * g.words_k + w], hull[hull_word_offset(&g, FACE_J_HIGH) + i * g.words_k + w], known,
-              false);
+              hull[hull_word_offset(&g, FACE_J_LOW) + i * g.words_k + w], hull[hull_word_offset(&g, FACE_J_HIGH) + i * g.words_k + w],
+              known, false);
 }
 
 // One path, up a word's bits: between events its state is a run.
@@ -84,7 +87,8 @@ INLINE ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
 }
 
 // One work item a path (i, j).
-__kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull, __global ulong* known) {
+__kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
   const int path = get_global_id(0);
   if (path >= g.size_i * g.size_j) return;
   const int i = path % g.size_i, j = path / g.size_i;
