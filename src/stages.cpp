@@ -229,7 +229,7 @@ std::size_t Stages::create_surfels() {
   View own = view_;  // as the camera itself sees it
   own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
   commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_,
-                static_cast<cl_int>(config_.slide_to_boundary), own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(),
+                static_cast<cl_int>(config_.refine_surfels), own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(),
                 layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), map_.position_radius(),
                 map_.normal_attributes(), map_.changed(), frame_, map_.free_list(), static_cast<cl_uint>(map_.free_slots()),
                 static_cast<cl_uint>(map_.slots()), in_view_slots_(), static_cast<cl_uint>(in_view_));

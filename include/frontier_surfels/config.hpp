@@ -38,7 +38,7 @@ struct Config {
 
   // Removal, creation and labels (paper 3.4, 3.5)
   bool remove_buried = true;
-  bool slide_to_boundary = true;
+  bool refine_surfels = true;
   double surface_depth = 0.03;
 
   /// Every fault, one sentence each; empty when the configuration can be used.
@@ -84,8 +84,8 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.recent_view_distance);
   visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
   visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
-  visit(FieldInfo{"slide_to_boundary", "", "new surfels stand near the boundary within their voxel, not at its centre"},
-        config.slide_to_boundary);
+  visit(FieldInfo{"refine_surfels", "", "new surfels stand near the boundary within their voxel, and their normals end in known space"},
+        config.refine_surfels);
   visit(
       FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1},
       config.surface_depth);

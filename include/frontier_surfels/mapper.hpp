@@ -40,7 +40,8 @@ class Mapper {
   /// Writes the map as a PLY file, to a temporary file first that is then renamed. @throws FileError
   void save(const std::string& path) const;
 
-  /// Replaces the map by a saved one, and forgets the recent views. @throws FileError: the map stays as it was
+  /// Replaces the map by a saved one, and forgets what is not in the file: the recent views, and which surfels stand in thin space (the
+  /// method then trusts those a little more). @throws FileError: the map stays as it was
   void load(const std::string& path);
 
   /// Forgets everything but the configuration and the sequence number.
