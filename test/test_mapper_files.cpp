@@ -86,7 +86,7 @@ TEST_F(MapperFiles, ASavedMapComesBack) {
 /// A loaded map is as good as the one that was saved: the next frames make the same of it.
 TEST_F(MapperFiles, MappingGoesOnWithALoadedMap) {
   Config config = undecimated();
-  config.recent_views = 0;  // these are not saved
+  config.recent_views = 0;        // these are not saved
   config.refine_surfels = false;  // nor is what it knows of thin space
   Mapper through(config), resumed(config);
   Frames plain = orbit_frames(coarse_camera(), 6, 6);
