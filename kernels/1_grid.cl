@@ -65,6 +65,13 @@ INLINE ulong bit_run(int from, int to) {
   return below_to & ~((1ul << from) - 1);  // from < to <= 64, so the shift is defined
 }
 
+// The word whose bit n is mark[n], 0 or 1.
+INLINE ulong pack_marks(__local const uchar* mark) {
+  ulong bits = 0;
+  for (int n = 0; n < 64; ++n) bits |= (ulong)mark[n] << n;
+  return bits;
+}
+
 INLINE int lowest_bit(ulong bits) { return 63 - (int)clz(bits & -bits); }
 
 INLINE int highest_bit(ulong bits) { return 63 - (int)clz(bits); }

@@ -65,11 +65,7 @@ __kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_in_view(const
     mark[lane] = may_reach_grid(&g, &limits, transform_point(&T_camera_world, position_radius[slot].xyz), position_radius[slot].w);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0) {
-    ulong bits = 0;
-    for (int bit = 0; bit < 64; ++bit) bits |= (ulong)mark[bit] << bit;
-    in_view[get_group_id(0)] = bits;
-  }
+  if (lane == 0) in_view[get_group_id(0)] = pack_marks(mark);
 }
 
 // One work item a surfel in view.

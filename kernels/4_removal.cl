@@ -24,11 +24,7 @@ __kernel __attribute__((reqd_work_group_size(64, 1, 1))) void mark_removed(const
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0) {
-    ulong bits = 0;
-    for (int bit = 0; bit < 64; ++bit) bits |= (ulong)mark[bit] << bit;
-    removed[get_group_id(0)] = bits;
-  }
+  if (lane == 0) removed[get_group_id(0)] = pack_marks(mark);
 }
 
 // One work item a removed surfel: its slot becomes free.

@@ -99,12 +99,18 @@ typedef struct {
   float3 normal, center;  // center: from the tile's first voxel [voxel]
   float2 ray;             // step = (ray, 1)
   float along, in_plane, step_n, step_step;
-  float a;        // of dk^2 in e^2
-  float core;     // (rho / 2)^2
-  int3 sign;      // of g_tau, 0 where the family is invalid near the surfel
+  float a;     // of dk^2 in e^2
+  float core;  // (rho / 2)^2
+  int sign_i, sign_j, sign_k;
   float3 extent;  // of the ellipsoid [voxel]
   uint layers;    // of the tile that it reaches
 } Footprint;
+
+// Sign of g_tau, 0 where the family is invalid near the surfel.
+INLINE int path_sign(const ViewSurfel* s, float g, float th_d) {
+  if (s->ragged != 0 || !(fabs(g) > th_d)) return 0;
+  return g > 0.0f ? 1 : -1;
+}
 
 INLINE Footprint make_footprint(const Limits* limits, const ViewSurfel* s, int3 origin) {
   Footprint f;
@@ -117,8 +123,9 @@ INLINE Footprint make_footprint(const Limits* limits, const ViewSurfel* s, int3 
   f.step_step = f.ray.x * f.ray.x + f.ray.y * f.ray.y + 1.0f;
   f.a = f.step_n * f.step_n * f.along + f.step_step * f.in_plane;
   f.core = 0.25f * s->reach * s->reach;
-  const float3 g = (float3)(s->n_x, s->n_y, s->n_k);
-  f.sign = select((int3)(0), select((int3)(-1), (int3)(1), g > 0.0f), fabs(g) > limits->th_d && s->ragged == 0);
+  f.sign_i = path_sign(s, s->n_x, limits->th_d);
+  f.sign_j = path_sign(s, s->n_y, limits->th_d);
+  f.sign_k = path_sign(s, s->n_k, limits->th_d);
   f.extent = ellipsoid_extents(s, limits->thickness);
   f.layers = run_in_tile(ceil_int(f.center.z - f.extent.z), floor_int(f.center.z + f.extent.z));
   return f;
@@ -147,7 +154,7 @@ INLINE void add_to_column(__local SignFieldTile* tile, __local const NeededPaths
   const int2 layers = negative_layers(f->a, b, c - 1.0f, f->center.z, -1, TILE_K);
   if (layers.x > layers.y) return;
 
-  const bool to_i = paths_i != 0 && f->sign.x != 0, to_j = paths_j != 0 && f->sign.y != 0, to_k = path_k != 0 && f->sign.z != 0;
+  const bool to_i = paths_i != 0 && f->sign_i != 0, to_j = paths_j != 0 && f->sign_j != 0, to_k = path_k != 0 && f->sign_k != 0;
   __local int* row_i = tile->i + ((i + 1) * TILE_J + j) * PADDED_K + 1;
   __local int* row_j = tile->j + (i * (TILE_J + 2) + j + 1) * PADDED_K + 1;
   __local int* row_k = tile->k + (i * TILE_J + j) * PADDED_K + 1;
@@ -156,22 +163,22 @@ INLINE void add_to_column(__local SignFieldTile* tile, __local const NeededPaths
     const float8 dk = convert_float8(layer) - f->center.z;
     const float8 e = sqrt(fmax(c + dk * (2.0f * b + dk * f->a), 0.0f));
     const int8 w = select((int8)(0), convert_int8(fmax(SIGN_FIELD_ONE * (1.0f - e) + 0.5f, 0.0f)), layer <= layers.y);
-    if (to_i) accumulate(row_i + k, w * f->sign.x);
-    if (to_j) accumulate(row_j + k, w * f->sign.y);
-    if (to_k) accumulate(row_k + k, w * f->sign.z);
+    if (to_i) accumulate(row_i + k, w * f->sign_i);
+    if (to_j) accumulate(row_j + k, w * f->sign_j);
+    if (to_k) accumulate(row_k + k, w * f->sign_k);
   }
 
   if (!in_i || !in_j) return;
   const int column = i * TILE_J + j;
   OR(tile->touched[column], run_in_tile(layers.x, layers.y));
-  if (all(f->sign != 0)) return;
+  if (f->sign_i != 0 && f->sign_j != 0 && f->sign_k != 0) return;
   // |u - (u.n) n| < rho / 2
   const int2 core = negative_layers(f->step_step - f->step_n * f->step_n, v_step - v_n * f->step_n, v_v - v_n * v_n - f->core, f->center.z,
                                     layers.x, layers.y);
   const uint invalid = run_in_tile(core.x, core.y);
-  if (f->sign.x == 0) OR(tile->invalid[0][column], invalid);
-  if (f->sign.y == 0) OR(tile->invalid[1][column], invalid);
-  if (f->sign.z == 0) OR(tile->invalid[2][column], invalid);
+  if (f->sign_i == 0) OR(tile->invalid[0][column], invalid);
+  if (f->sign_j == 0) OR(tile->invalid[1][column], invalid);
+  if (f->sign_k == 0) OR(tile->invalid[2][column], invalid);
 }
 
 // The part of a surfel's ellipsoid that lies in the tile whose first voxel is `origin`.

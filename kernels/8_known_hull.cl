@@ -6,8 +6,8 @@
 
 #define HULL_EMPTY 0xffffffffu
 
-INLINE uint face_offset(const Grid* g, int face) {
-  const uint face_i = g->size_j * g->size_k, face_j = g->size_i * g->size_k, face_k = g->size_i * g->size_j;
+// Where one of six faces starts in a buffer that holds them in order, opposite ones being of the same size.
+INLINE uint face_start(int face, uint face_i, uint face_j, uint face_k) {
   switch (face) {
     case FACE_I_LOW:
       return 0;
@@ -22,6 +22,11 @@ INLINE uint face_offset(const Grid* g, int face) {
     default:
       return 2 * (face_i + face_j) + face_k;
   }
+}
+
+// Number of the first key of a face.
+INLINE uint face_offset(const Grid* g, int face) {
+  return face_start(face, g->size_j * g->size_k, g->size_i * g->size_k, g->size_i * g->size_j);
 }
 
 // Enters a surfel into the cells of an ellipse in a face, those on paths to be walked (and their neighbours).
@@ -96,21 +101,7 @@ INLINE bool hull_cell(__global const uint* face, int width, int height, int colu
 // Number of the first word of a face in the hull's bits: i faces [size_j][words_k], j faces [size_i][words_k], bits along k;
 // k faces [size_j][size_i], a word each.
 INLINE uint hull_word_offset(const Grid* g, int face) {
-  const uint face_i = g->size_j * g->words_k, face_j = g->size_i * g->words_k, face_k = g->size_i * g->size_j;
-  switch (face) {
-    case FACE_I_LOW:
-      return 0;
-    case FACE_I_HIGH:
-      return face_i;
-    case FACE_J_LOW:
-      return 2 * face_i;
-    case FACE_J_HIGH:
-      return 2 * face_i + face_j;
-    case FACE_K_LOW:
-      return 2 * (face_i + face_j);
-    default:
-      return 2 * (face_i + face_j) + face_k;
-  }
+  return face_start(face, g->size_j * g->words_k, g->size_i * g->words_k, g->size_i * g->size_j);
 }
 
 // One work item a word of the hull; dimension 1 is the face.

@@ -1,7 +1,6 @@
 #include "frontier_surfels/mapper.hpp"
 
 #include <chrono>
-#include <optional>
 
 #include "frontier_surfels/ply.hpp"
 #include "opencl/commands.hpp"
@@ -64,6 +63,7 @@ Report Mapper::integrate(const DepthFrame& frame) {
 
 Report Mapper::Impl::integrate(const DepthFrame& frame) {
   const auto start = Clock::now();
+  commands.forget_times();  // of a frame that failed half way
   Report report;
   report.stamp = frame.stamp;
   report.sequence = sequence + 1;

@@ -141,7 +141,7 @@ std::size_t Stages::split_surfels() {
 }
 
 void Stages::place_surfels() {
-  view_surfels_.resize(in_view_);
+  view_surfels_.resize(std::max<std::size_t>(in_view_, 1));  // the sign field is computed without surfels, too
   commands_.run("split", "place_surfels", in_view_, kGroup, grid_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
                 in_view_slots_(), static_cast<cl_uint>(in_view_), view_surfels_());
 }
@@ -160,7 +160,6 @@ void Stages::compute_sign_field() {
   tile_surfels_.resize(std::max<std::size_t>(scan(stage, tile_begin_, tiles), 1));
   commands_.queue().enqueueCopyBuffer(tile_begin_(), tile_cursor_(), 0, 0, (tiles + 1) * sizeof(cl_uint));
   commands_.run(stage, "fill_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_cursor_(), tile_surfels_());
-  view_surfels_.resize(1);
   const std::size_t group = commands_.device().is_cpu ? 1 : 64;
   commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, lines_(), view_surfels_(), tile_begin_(), tile_surfels_(),
                 events_());

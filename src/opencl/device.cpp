@@ -67,13 +67,18 @@ std::string listing(const std::vector<Candidate>& candidates) {
 cl::Device limit_threads(const cl::Device& device, int threads) {
   if (threads == 0 || threads >= static_cast<int>(device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>())) return device;
   const cl_device_partition_property by_counts[] = {CL_DEVICE_PARTITION_BY_COUNTS, threads, CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+  const auto cannot = [&](const std::string& why) {
+    return DeviceError("The device " + device.getInfo<CL_DEVICE_NAME>() + " cannot be limited to " + std::to_string(threads) +
+                       " compute units (" + why + "); set threads to 0.");
+  };
+  const auto ways = device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  if (std::find(ways.begin(), ways.end(), CL_DEVICE_PARTITION_BY_COUNTS) == ways.end()) throw cannot("it cannot be divided by counts");
   std::vector<cl::Device> parts;
   try {
     cl::Device whole = device;
     whole.createSubDevices(by_counts, &parts);
   } catch (const cl::Error& error) {
-    throw DeviceError("The device " + device.getInfo<CL_DEVICE_NAME>() + " cannot be limited to " + std::to_string(threads) +
-                      " compute units (" + opencl_error_name(error.err()) + "); set threads to 0.");
+    throw cannot(opencl_error_name(error.err()));
   }
   return parts.front();
 }
