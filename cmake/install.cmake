@@ -10,6 +10,14 @@ install(TARGETS frontier_surfels frontier_surfels_scoring EXPORT frontier_surfel
 install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
 install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO}
   PATTERN replay EXCLUDE)  # belongs to the programs
+if(FRONTIER_SURFELS_WITH_ROS)
+  set_target_properties(mapper_node PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
+  set_target_properties(frontier_surfels_ros PROPERTIES INSTALL_RPATH "$ORIGIN")
+  install(TARGETS frontier_surfels_ros LIBRARY DESTINATION ${INSTALL_LIBRARIES_TO})
+  install(TARGETS mapper_node RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
+  install(FILES nodelet_plugins.xml DESTINATION ${INSTALL_SHARE_TO})
+  install(DIRECTORY launch rviz DESTINATION ${INSTALL_SHARE_TO})
+endif()
 install(DIRECTORY config DESTINATION ${INSTALL_SHARE_TO})
 install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # the report's template
 file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)

@@ -31,10 +31,15 @@ if(NOT CMAKE_INSTALL_PREFIX STREQUAL \"${CMAKE_INSTALL_PREFIX}\")
 endif()
 ")
   endif()
-  find_package(catkin REQUIRED COMPONENTS cv_bridge rosbag_storage sensor_msgs tf2 tf2_msgs)
+  find_package(catkin REQUIRED COMPONENTS cv_bridge diagnostic_updater geometry_msgs image_geometry image_transport message_generation
+    nodelet rosbag_storage roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros visualization_msgs)
+  add_message_files(FILES FrameReport.msg SurfelUpdate.msg)
+  add_service_files(FILES GetSurfels.srv MapFile.srv)
+  generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
   catkin_package(
     INCLUDE_DIRS include
     LIBRARIES frontier_surfels frontier_surfels_scoring
+    CATKIN_DEPENDS geometry_msgs message_runtime sensor_msgs std_msgs
     CFG_EXTRAS frontier_surfels-extras.cmake)
   set(INSTALL_PROGRAMS_TO ${CATKIN_PACKAGE_BIN_DESTINATION})
   set(INSTALL_LIBRARIES_TO ${CATKIN_PACKAGE_LIB_DESTINATION})

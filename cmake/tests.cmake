@@ -38,3 +38,7 @@ endforeach()
 add_test(NAME test_replay_score
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
 set_tests_properties(test_replay_score PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+
+if(FRONTIER_SURFELS_WITH_ROS)
+  include(cmake/ros_tests.cmake)
+endif()

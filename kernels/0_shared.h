@@ -93,6 +93,8 @@ typedef struct {
   float split_radius;       // surfels of this radius or more are split [voxel]
   float create_radius;      // of a new surfel [voxel]
   float normal_min;         // shorter sums of directions make no surfel
+  float min_gap;            // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
+  float surface_depth;      // so far behind a measured surface a surfel is occupied [m]
   SHARED_INT median_votes;
 } Limits;
 
@@ -101,7 +103,7 @@ static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
 static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
 static_assert(sizeof(View) == 20 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
-static_assert(sizeof(Limits) == 8 * 4, "Limits must have no padding");
+static_assert(sizeof(Limits) == 10 * 4, "Limits must have no padding");
 }  // namespace frontier_surfels
 #endif
 

@@ -1,22 +1,5 @@
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
-// Normal of a surfel at voxel v, camera frame, not normalised: the mean direction to the observed ones of the 26 voxels around it.
-float3 observed_direction(const Grid* g, __global const float* layer_depth, __global const ulong* observed, int3 v) {
-  const float3 center = voxel_center(g, layer_depth, v);
-  float3 sum = (float3)(0.0f);
-  for (int dk = -1; dk <= 1; ++dk) {
-    for (int dj = -1; dj <= 1; ++dj) {
-      for (int di = -1; di <= 1; ++di) {
-        const int3 u = v + (int3)(di, dj, dk);
-        if (!inside_grid(g, u) || !test_bit(g, observed, u)) continue;  // v itself is not observed
-        const float3 direction = voxel_center(g, layer_depth, u) - center;
-        sum += direction / length(direction);
-      }
-    }
-  }
-  return sum;
-}
-
 // New surfel filter. One work item a word: candidates that are known, or whose directions cancel, make no surfel.
 //   in  observed: C~;  known: K~;   i/o candidates
 __kernel void filter_candidates(const Grid g, const Limits limits, __global const float* layer_depth, __global const ulong* observed,
@@ -54,15 +37,6 @@ float3 surfel_normal(const Grid* g, const View* view, __global const float* dept
     }
   }
   return best;
-}
-
-INLINE bool any_view_knows(__global const View* views, int view_count, __global const float* depths, float3 p) {
-  for (int n = 0; n < view_count; ++n) {
-    const View view = views[n];
-    const float3 q = transform_point(&view.T_camera_world, p);
-    if (q.z > 0.0f && view_knows(&view, depths, q)) return true;
-  }
-  return false;
 }
 
 // Where in its voxel a surfel stands: slid along its normal until it is near the boundary, in steps of a tenth of a voxel. A step is left

@@ -2,7 +2,7 @@
 
 // One work item a surfel in view, new ones included.
 //   in  depth, column_end: of 2_observed_space;  color[height][width]: red | green << 8 | blue << 16, if has_color
-__kernel void label_surfels(const Grid g, const Transform T_camera_world, const float surface_depth, __global const float* depth,
+__kernel void label_surfels(const Grid g, const Limits limits, const Transform T_camera_world, __global const float* depth,
                             __global const int* column_end, __global const uint* color, const int has_color,
                             __global const uint* in_view_slots, const uint count, __global const float4* position_radius,
                             __global float4* normal_attributes, __global uint* changed, const uint frame) {
@@ -16,16 +16,10 @@ __kernel void label_surfels(const Grid g, const Transform T_camera_world, const 
 
   const float3 p = transform_point(&T_camera_world, position_radius[slot].xyz);
   const int3 v = voxel_of(to_grid(&g, p));
-  const int s = v.x - g.padding_i, t = v.y - g.padding_j;
-  if (s < 0 || t < 0 || s >= g.width || t >= g.height) return;
-  const int pixel = t * g.width + s;
-  if ((float)v.z <= g.k_min || depth[pixel] <= 0.0f) return;
-  // The layer before is the column's last observed one, and what ended it is a surface; or the surfel is in the body behind the surface.
-  const bool at_surface = v.z == column_end[pixel] && v.z > g.first_pyramid_layer;
-  if (!at_surface && !(p.z >= depth[pixel] && p.z <= depth[pixel] + surface_depth)) return;
+  if (!at_surface(&g, depth, column_end, limits.surface_depth, v, p.z)) return;
 
   uint labelled = attributes | SURFEL_OCCUPIED;
-  if (!colored) labelled = (labelled & 0xff000000u) | SURFEL_COLORED | color[pixel];
+  if (!colored) labelled = (labelled & 0xff000000u) | SURFEL_COLORED | color[pixel_of(&g, v)];
   normal_attributes[slot].w = as_float(labelled);
   changed[slot] = frame;
 }

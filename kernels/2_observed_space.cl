@@ -59,3 +59,16 @@ INLINE bool view_knows(const View* view, __global const float* depths, float3 p)
   if (!(s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height)) return false;
   return p.z < fabs(depths[view->first_pixel + (int)t * view->width + (int)s]);
 }
+
+// Pixel whose column of voxels holds v, -1 if it is in the padding.
+INLINE int pixel_of(const Grid* g, int3 v) {
+  const int s = v.x - g->padding_i, t = v.y - g->padding_j;
+  return s < 0 || t < 0 || s >= g->width || t >= g->height ? -1 : t * g->width + s;
+}
+
+// Is voxel v at the measured surface that ended its column, or a point of it, at depth z, at most `surface_depth` behind that?
+INLINE bool at_surface(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, int3 v, float z) {
+  const int pixel = pixel_of(g, v);
+  if (pixel < 0 || (float)v.z <= g->k_min || depth[pixel] <= 0.0f) return false;
+  return (v.z == column_end[pixel] && v.z > g->first_pyramid_layer) || (z >= depth[pixel] && z <= depth[pixel] + surface_depth);
+}

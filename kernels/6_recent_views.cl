@@ -44,6 +44,41 @@ __kernel void settle_candidates(const Grid g, __global const View* views, const 
   }
 }
 
+// Does this view, or a kept one, know a point of this frame's camera?
+INLINE bool any_view_knows(__global const View* views, int view_count, __global const float* depths, float3 p) {
+  for (int n = 0; n < view_count; ++n) {
+    const View view = views[n];
+    const float3 q = transform_point(&view.T_camera_world, p);
+    if (q.z > 0.0f && view_knows(&view, depths, q)) return true;
+  }
+  return false;
+}
+
+// Frontier on a sheet of unknown thinner than min_gap, known on both sides, bounds nothing worth a look: left out. A thin body's surfaces
+// stay. One work item a word.
+//   in  observed: C~;  depth, column_end: of 2_observed_space;  view: this frame's, views[view_count]: the kept ones, both in this
+//       frame's camera;  depths: their images
+//   i/o candidates: those with known space again `min_gap` behind them are cleared
+__kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, const int view_count,
+                         __global const float* depths, __global const float* layer_depth, __global const float* depth,
+                         __global const int* column_end, __global const ulong* observed, __global ulong* candidates) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  ulong kept = candidates[word];
+  for (ulong left = kept; left != 0; left &= left - 1) {
+    const int bit = lowest_bit(left);
+    const int3 v = (int3)(i, j, 64 * w + bit);
+    const float3 center = voxel_center(&g, layer_depth, v);
+    if (at_surface(&g, depth, column_end, limits.surface_depth, v, center.z)) continue;
+    const float3 direction = observed_direction(&g, layer_depth, observed, v);
+    if (length(direction) < limits.normal_min) continue;
+    const float3 behind = center - limits.min_gap * normalize(direction);
+    if (view_knows(&view, depths, behind) || any_view_knows(views, view_count, depths, behind)) kept &= ~(1ul << bit);
+  }
+  candidates[word] = kept;
+}
+
 // Paths that section 4 must still walk: those through the 27 voxels around a candidate, and their neighbours, which the hull looks at.
 // Three fields, one after the other: i paths [size_j][words_k] and j paths [size_i][words_k], a bit each along k; k paths [size_j][size_i],
 // a 32-bit number each.
@@ -55,8 +90,8 @@ INLINE int lines_k(const Grid* g, int i, int j) { return 2 * (g->size_i + g->siz
 
 INLINE void or_word(__global uint* lines, int at, ulong bits) {
   const uint low = (uint)bits, high = (uint)(bits >> 32);
-  if (low & ~lines[at]) atomic_or(&lines[at], low);  // the look before saves most of the atomics
-  if (high & ~lines[at + 1]) atomic_or(&lines[at + 1], high);
+  if (low != 0) atomic_or(&lines[at], low);
+  if (high != 0) atomic_or(&lines[at + 1], high);
 }
 
 // One work item a word.

@@ -11,13 +11,13 @@
 #endif
 
 #define PADDED_K (TILE_K + 2)
+#define BEYOND 8  // a vector that begins in the last row may end behind it
 
 // The sign field of a tile, each family with one voxel more before and behind along its own paths.
 typedef struct {
-  int i[(TILE_I + 2) * TILE_J * PADDED_K];
-  int j[TILE_I * (TILE_J + 2) * PADDED_K];
-  int k[TILE_I * TILE_J * PADDED_K];
-  int beyond[8];                  // a vector that begins in the last row may end here
+  int i[(TILE_I + 2) * TILE_J * PADDED_K + BEYOND];
+  int j[TILE_I * (TILE_J + 2) * PADDED_K + BEYOND];
+  int k[TILE_I * TILE_J * PADDED_K + BEYOND];
   uint touched[TILE_I * TILE_J];  // bits along k that a surfel reached
   uint invalid[3][TILE_I * TILE_J];
 } SignFieldTile;
@@ -40,6 +40,18 @@ INLINE void accumulate(__local int* target, int8 values) {
 }
 #endif
 
+// Sets numbers to zero, all work items of the group together.
+INLINE void clear(__local int* numbers, size_t bytes) {
+  for (int n = get_local_id(0); n < (int)(bytes / sizeof(int)); n += SIGN_FIELD_GROUP) numbers[n] = 0;
+}
+INLINE void clear_tile(__local SignFieldTile* tile) {
+  clear(tile->i, sizeof(tile->i));
+  clear(tile->j, sizeof(tile->j));
+  clear(tile->k, sizeof(tile->k));
+  clear((__local int*)tile->touched, sizeof(tile->touched));
+  for (int family = 0; family < 3; ++family) clear((__local int*)tile->invalid[family], sizeof(tile->invalid[family]));
+}
+
 // Bits first ... last of a tile's column, both -1 ... TILE_K.
 INLINE uint run_in_tile(int first, int last) {
   first = max(first, 0);
@@ -54,7 +66,7 @@ bool tile_range(const Grid* g, const Limits* limits, const ViewSurfel* s, int3* 
   const int3 high = (int3)(floor_int(c.x + extent.x), floor_int(c.y + extent.y), floor_int(c.z + extent.z)) + 1;
   const int3 size = (int3)(g->size_i, g->size_j, g->size_k), tile = (int3)(TILE_I, TILE_J, TILE_K);
   if (any(high < 0) || any(low >= size)) return false;
-  *first = max(low, 0) / tile;
+  *first = max(low, (int3)(0)) / tile;  // not a plain 0, which Oclgrind 21 takes for a vector
   *last = min(high, size - 1) / tile;
   return true;
 }
@@ -243,8 +255,7 @@ __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign
   barrier(CLK_LOCAL_MEM_FENCE);
 
   const bool walked = needed.any != 0;
-  __local int* all = (__local int*)&tile;
-  for (int n = lane; walked && n < (int)(sizeof(SignFieldTile) / sizeof(int)); n += SIGN_FIELD_GROUP) all[n] = 0;
+  if (walked) clear_tile(&tile);
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint n = tile_begin[number] + lane; walked && n < tile_begin[number + 1]; n += SIGN_FIELD_GROUP) {
     const ViewSurfel s = view_surfels[tile_surfels[n]];

@@ -48,8 +48,7 @@ INLINE void stamp_face(__global uint* face, int width, int height, float2 center
         continue;
       }
       if ((along_k ? (needed[column >> 5] >> (column & 31)) & 1 : needed[column]) == 0) continue;
-      __global uint* cell = &face[row * width + column];
-      if (key < *cell) atomic_min(cell, key);  // the look before saves most of the atomics
+      atomic_min(&face[row * width + column], key);
     }
   }
 }

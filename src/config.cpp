@@ -53,17 +53,19 @@ std::string to_text(double value) {
   }
 }
 
-std::string suggestion(const std::string& name) {
+std::string suggestion(const std::string& name, const std::vector<std::string>& more) {
+  std::vector<std::string> names = more;
+  const Config defaults;
+  for_each_field(defaults, [&](const FieldInfo& info, const auto&) { names.push_back(info.name); });
   std::string nearest;
   std::size_t smallest = 2 + name.size() / 4;  // further away is another word
-  const Config defaults;
-  for_each_field(defaults, [&](const FieldInfo& info, const auto&) {
-    const std::size_t distance = edit_distance(name, info.name);
+  for (const std::string& candidate : names) {
+    const std::size_t distance = edit_distance(name, candidate);
     if (distance < smallest) {
       smallest = distance;
-      nearest = info.name;
+      nearest = candidate;
     }
-  });
+  }
   return nearest.empty() ? "; README.md lists all parameters." : "; did you mean '" + nearest + "'?";
 }
 

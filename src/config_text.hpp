@@ -12,7 +12,4 @@ inline std::string to_text(const std::string& value) { return value; }
 /// The shortest decimal text that reads back as the same number; .nan, .inf, -.inf as YAML writes them.
 std::string to_text(double value);
 
-/// "; did you mean 'x'?" with the field's name nearest to `name`, or where to find all names if none is near.
-std::string suggestion(const std::string& name);
-
 }  // namespace frontier_surfels

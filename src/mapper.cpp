@@ -50,6 +50,7 @@ struct Mapper::Impl {
   RecentViews views;
   Stages stages;
   std::uint64_t sequence = 0;
+  std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -70,6 +71,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
 
   // The working image and its grid - 3.1, eq. (2)-(3)
   const WorkingImage image = make_working_image(frame, config);
+  frame_on_device = 0;
   stages.begin_frame(image, frame.T_world_camera, static_cast<std::uint32_t>(report.sequence));
 
   // Observed space C~ - 3.3, eq. (9)-(11)
@@ -106,8 +108,10 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
 
   report.view_kept = views.keep_current();
   report.stages = commands.take_times();
-  sequence = report.sequence;
+  sequence = frame_on_device = report.sequence;
   report.surfels = map.size();
+  report.map_bytes = map.bytes();
+  report.device_bytes = commands.allocated_bytes();
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
@@ -124,7 +128,9 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 }
 
 Changes Mapper::changes(std::uint64_t since) const {
-  Changes changes = on_device([&] { return impl_->map.changes(since); });
+  // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
+  const bool last_frame = impl_->frame_on_device == impl_->sequence && since + 1 == impl_->sequence;
+  Changes changes = on_device([&] { return last_frame ? impl_->stages.changes() : impl_->map.changes(since); });
   changes.sequence = impl_->sequence;
   return changes;
 }
@@ -153,6 +159,7 @@ Statistics Mapper::statistics() const {
   return statistics;
 }
 
+std::size_t Mapper::size() const { return impl_->map.size(); }
 std::uint64_t Mapper::sequence() const { return impl_->sequence; }
 const Config& Mapper::config() const { return impl_->config; }
 std::string Mapper::device() const { return impl_->commands.device().description; }

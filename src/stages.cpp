@@ -18,6 +18,8 @@ Limits make_limits(const Config& config) {
   limits.split_radius = 2 * std::sqrt(3.0F);
   limits.create_radius = std::sqrt(3.0F) / 2;
   limits.normal_min = 0.01F;
+  limits.min_gap = static_cast<float>(config.min_gap);
+  limits.surface_depth = static_cast<float>(config.surface_depth);
   limits.median_votes = config.median_votes;
   return limits;
 }
@@ -57,6 +59,10 @@ Stages::Stages(Commands& commands, const Config& config, SurfelMap& map, RecentV
       removed_list_(commands),
       created_voxels_(commands),
       view_surfels_(commands),
+      changed_bits_(commands),
+      changed_slots_(commands),
+      changed_positions_(commands),
+      changed_normals_(commands),
       tile_begin_(commands),
       tile_cursor_(commands),
       tile_surfels_(commands),
@@ -101,6 +107,12 @@ void Stages::allocate_grid() {
   lines_.resize(line_numbers());
   hull_faces_.resize(2 * (j * k + i * k + i * j));
   hull_.resize(2 * (j * w + i * w + i * j));
+}
+
+View Stages::own_view() const {
+  View own = view_;
+  own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
+  return own;
 }
 
 void Stages::observe_space() {
@@ -190,8 +202,9 @@ void Stages::mark_removed() {
   const char* stage = "removal";
   occupied_voxels_.fill(stage, 0, words());
   removed_bits_.resize((in_view_ + 63) / 64 + 1);
-  commands_.run(stage, "mark_removed", in_view_, 64, grid_, view_, static_cast<cl_int>(config_.remove_buried), views_.depths(),
-                view_surfels_(), static_cast<cl_uint>(in_view_), map_.position_radius(), observed_(), occupied_voxels_(), removed_bits_());
+  commands_.run(stage, "mark_removed", in_view_, 64, grid_, limits_, view_, static_cast<cl_int>(config_.remove_buried), views_.depths(),
+                view_surfels_(), static_cast<cl_uint>(in_view_), map_.position_radius(), map_.normal_attributes(), observed_(),
+                occupied_voxels_(), removed_bits_());
 }
 
 void Stages::find_candidates() {
@@ -204,6 +217,9 @@ void Stages::settle_by_recent_views() {
   if (count > 0)
     commands_.run(stage, "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(),
                   candidates_());
+  if (config_.min_gap > 0)
+    commands_.run(stage, "close_gaps", words(), kGroup, grid_, limits_, own_view(), views_.views(), count, views_.depths(), layer_depth_(),
+                  depth_(), column_end_(), observed_(), candidates_());
   if (!is_open()) return;
   lines_.fill(stage, 0, line_numbers());
   commands_.run(stage, "mark_lines", words(), kGroup, grid_, candidates_(), lines_());
@@ -225,22 +241,35 @@ std::size_t Stages::remove_surfels() {
 }
 
 std::size_t Stages::create_surfels() {
-  View own = view_;  // as the camera itself sees it
-  own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
-  commands_.run("creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_,
-                static_cast<cl_int>(config_.refine_surfels), own, views_.views(), static_cast<cl_int>(views_.count()), views_.depths(),
-                layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), map_.position_radius(),
-                map_.normal_attributes(), map_.changed(), frame_, map_.free_list(), static_cast<cl_uint>(map_.free_slots()),
-                static_cast<cl_uint>(map_.slots()), in_view_slots_(), static_cast<cl_uint>(in_view_));
+  commands_.run(
+      "creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, static_cast<cl_int>(config_.refine_surfels),
+      own_view(), views_.views(), static_cast<cl_int>(views_.count()), views_.depths(), layer_depth_(), observed_(), created_voxels_(),
+      static_cast<cl_uint>(created_count_), map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_, map_.free_list(),
+      static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()), in_view_slots_(), static_cast<cl_uint>(in_view_));
   map_.added(created_count_);
   in_view_ += created_count_;
   return created_count_;
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, T_camera_world_, static_cast<float>(config_.surface_depth), depth_(),
-                column_end_(), color_(), static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_),
-                map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_);
+  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, limits_, T_camera_world_, depth_(), column_end_(), color_(),
+                static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.position_radius(),
+                map_.normal_attributes(), map_.changed(), frame_);
+}
+
+Changes Stages::changes() {
+  const char* stage = "changes";
+  const std::size_t words = (map_.slots() + 63) / 64;
+  changed_bits_.resize(words + 1);
+  changed_bits_.fill(stage, 0, words + 1);
+  commands_.run(stage, "mark_changed", in_view_, kGroup, in_view_slots_(), static_cast<cl_uint>(in_view_), map_.changed(), frame_,
+                changed_bits_());
+  const std::uint32_t count = list_bits(stage, changed_bits_, words, changed_slots_);
+  changed_positions_.resize(count);
+  changed_normals_.resize(count);
+  commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, map_.position_radius(), map_.normal_attributes(),
+                changed_positions_(), changed_normals_());
+  return to_changes(changed_slots_.read(count), changed_positions_.read(count), changed_normals_.read(count));
 }
 
 std::uint32_t Stages::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {

@@ -38,6 +38,9 @@ class Stages {
   std::size_t create_surfels();  ///< @return how many
   void label_surfels();
 
+  /// What the frame has changed, by slot. Only once it is labelled, and before anything else happens to the map.
+  Changes changes();
+
  private:
   friend class StagesProbe;  // tests read and write the fields between stages
 
@@ -49,6 +52,7 @@ class Stages {
   void place_surfels();
   void set_grid(const WorkingImage& image);
   void allocate_grid();
+  View own_view() const;  ///< this frame's, as the camera itself sees it
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level = 0);
   std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
 
@@ -81,6 +85,9 @@ class Stages {
   DeviceArray<cl_ulong> in_view_bits_, removed_bits_;
   DeviceArray<cl_uint> in_view_slots_, split_offsets_, removed_list_, created_voxels_;
   DeviceArray<ViewSurfel> view_surfels_;
+  DeviceArray<cl_ulong> changed_bits_;
+  DeviceArray<cl_uint> changed_slots_;
+  DeviceArray<cl_float4> changed_positions_, changed_normals_;
   DeviceArray<cl_uint> tile_begin_, tile_cursor_, tile_surfels_;
 
   // Prefix sums

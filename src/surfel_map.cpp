@@ -36,7 +36,20 @@ cl_float4 pack_normal(const Surfel& surfel) {
   return packed;
 }
 
+void add_to(Changes& changes, std::uint32_t slot, const cl_float4& position, const cl_float4& normal) {
+  if (attributes_of(normal) & SURFEL_ALIVE)
+    changes.updated.push_back(to_surfel(position, normal, slot));
+  else
+    changes.removed.push_back(slot);
+}
+
 }  // namespace
+
+Changes to_changes(const std::vector<cl_uint>& slots, const std::vector<cl_float4>& positions, const std::vector<cl_float4>& normals) {
+  Changes changes;
+  for (std::size_t n = 0; n < slots.size(); ++n) add_to(changes, slots[n], positions[n], normals[n]);
+  return changes;
+}
 
 SurfelMap::SurfelMap(Commands& commands)
     : position_radius_(commands), normal_attributes_(commands), changed_(commands), free_list_(commands) {
@@ -69,13 +82,8 @@ Changes SurfelMap::changes(std::uint64_t since) const {
   const auto positions = position_radius_.read(slots_), normals = normal_attributes_.read(slots_);
   const auto changed = changed_.read(slots_);
   Changes changes;
-  for (std::size_t slot = 0; slot < slots_; ++slot) {
-    if (changed[slot] <= since) continue;
-    if (attributes_of(normals[slot]) & SURFEL_ALIVE)
-      changes.updated.push_back(to_surfel(positions[slot], normals[slot], slot));
-    else
-      changes.removed.push_back(static_cast<std::uint32_t>(slot));
-  }
+  for (std::size_t slot = 0; slot < slots_; ++slot)
+    if (changed[slot] > since) add_to(changes, static_cast<std::uint32_t>(slot), positions[slot], normals[slot]);
   return changes;
 }
 

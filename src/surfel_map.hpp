@@ -9,6 +9,9 @@
 
 namespace frontier_surfels {
 
+/// Surfels of slots: those alive are updated, the others removed.
+Changes to_changes(const std::vector<cl_uint>& slots, const std::vector<cl_float4>& positions, const std::vector<cl_float4>& normals);
+
 class SurfelMap {
  public:
   explicit SurfelMap(Commands& commands);

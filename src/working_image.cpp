@@ -62,7 +62,7 @@ float read_depth(const DepthImage& image, int s, int t) {
     std::uint16_t millimetres;
     std::memcpy(&millimetres, row + 2 * s, 2);
     if (image.swap_bytes) millimetres = __builtin_bswap16(millimetres);
-    return static_cast<float>(millimetres) * 0.001f;
+    return static_cast<float>(millimetres) / 1000.0F;
   }
   std::uint32_t bits;
   std::memcpy(&bits, row + 4 * s, 4);

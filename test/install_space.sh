@@ -57,4 +57,29 @@ if [ -e "$prefix/.catkin" ]; then
   consumer catkin "$prefix" -DTHROUGH_CATKIN=ON
   consumer devel "$build/devel"
 fi
+if [ -e "$prefix/.catkin" ]; then
+  (
+    set +u  # setup.bash reads unset variables
+    # shellcheck source=/dev/null
+    . "$prefix/setup.bash"
+    set -u
+    /usr/bin/python3 - "$prefix" <<'PYTHON'
+import glob, os, sys
+import rospkg
+from roslaunch import rlutil
+prefix = sys.argv[1]
+folder = rospkg.RosPack().get_path("frontier_surfels")
+assert folder == os.path.join(prefix, "share/frontier_surfels"), folder
+assert os.path.isfile(os.path.join(folder, "nodelet_plugins.xml")), "the nodelet's description is not installed"
+assert os.path.isfile(os.path.join(prefix, "lib/libfrontier_surfels_ros.so")), "the nodelet is not installed"
+files = glob.glob(os.path.join(folder, "launch/*.launch"))
+assert files, "no launch file is installed"
+for name in files:
+    fault = rlutil.check_roslaunch(name)
+    assert not fault or "requires the 'bag' arg" in fault, fault
+PYTHON
+    rosmsg show frontier_surfels/SurfelUpdate >/dev/null || fail "the messages are not installed"
+    ! ldd "$programs/mapper_node" "$prefix/lib/libfrontier_surfels_ros.so" | grep "not found" || fail "the node's libraries are not found"
+  )
+fi
 echo "The install space works."

@@ -234,6 +234,7 @@ TEST(ShippedFiles, PaperYamlIsTable1) {
   EXPECT_EQ(all_problems(paper), "");
   EXPECT_EQ(paper.recent_views, 0);
   EXPECT_FALSE(paper.remove_buried);
+  EXPECT_EQ(paper.min_gap, 0);
   EXPECT_FALSE(paper.refine_surfels);
   EXPECT_EQ(paper.surface_depth, 0);
   EXPECT_DOUBLE_EQ(paper.th_d, std::cos(80 * std::acos(-1) / 180));

@@ -48,7 +48,7 @@ Frames in_metres(Frames frames) {
   for (auto& frame : frames) {
     cv::Mat metres(frame.depth.size(), CV_32FC1);
     for (int v = 0; v < metres.rows; ++v)
-      for (int u = 0; u < metres.cols; ++u) metres.at<float>(v, u) = static_cast<float>(frame.depth.at<std::uint16_t>(v, u)) * 0.001F;
+      for (int u = 0; u < metres.cols; ++u) metres.at<float>(v, u) = static_cast<float>(frame.depth.at<std::uint16_t>(v, u)) / 1000.0F;
     frame.depth = metres;
   }
   return frames;

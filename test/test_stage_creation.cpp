@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/reference_observed_space.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/reference_views.hpp"
 #include "stages/stages_probe.hpp"
@@ -10,25 +11,6 @@ namespace frontier_surfels {
 namespace {
 
 using namespace reference;
-
-/// Unit vectors from voxel v to those of the 26 around it that have C~ = 1.
-std::vector<Vector3d> directions(const Nuvg& grid, const Field<char>& observed, int i, int j, int k) {
-  std::vector<Vector3d> found;
-  for (int di = -1; di <= 1; ++di)
-    for (int dj = -1; dj <= 1; ++dj)
-      for (int dk = -1; dk <= 1; ++dk) {
-        if (di == 0 && dj == 0 && dk == 0) continue;
-        if (!observed.contains(i + di, j + dj, k + dk) || !observed(i + di, j + dj, k + dk)) continue;
-        found.push_back((grid.center_of(i + di, j + dj, k + dk) - grid.center_of(i, j, k)).normalized());
-      }
-  return found;
-}
-
-Vector3d sum_of_directions(const Nuvg& grid, const Field<char>& observed, int i, int j, int k) {
-  Vector3d sum = Vector3d::Zero();
-  for (const Vector3d& direction : directions(grid, observed, i, j, k)) sum += direction;
-  return sum;
-}
 
 void check_filter(const Camera& camera, double observed_density, double known_density) {
   SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
@@ -47,7 +29,7 @@ void check_filter(const Camera& camera, double observed_density, double known_de
   Field<Truth> expected = grid.field(Truth::no);
   for_each_voxel(candidates, [&](int i, int j, int k) {
     if (!candidates(i, j, k) || known(i, j, k)) return;
-    expected(i, j, k) = !less(sum_of_directions(grid, observed, i, j, k).norm(), 0.01, 1e-4);
+    expected(i, j, k) = !less(sum_of_directions(grid, observed, Vector3i(i, j, k)).norm(), 0.01, 1e-4);
   });
   expect_equal("candidates left", expected, probe.candidates());
 }
@@ -106,8 +88,8 @@ Truth has_known_front(const Scene& scene, const Vector3i& v, const Vector3d& nor
 /// of those to single observed voxels that have it.
 bool is_normal(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
   constexpr double kTolerance = 1e-3;
-  const std::vector<Vector3d> all = directions(scene.grid, scene.observed, v.x(), v.y(), v.z());
-  const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v.x(), v.y(), v.z()).normalized();
+  const std::vector<Vector3d> all = directions(scene.grid, scene.observed, v);
+  const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v).normalized();
   const auto has_front = [&](const Vector3d& n) { return has_known_front(scene, v, n); };
   double certain = -2;  // cosine between the mean and the nearest direction that certainly has known space before it
   for (const Vector3d& direction : all)
@@ -157,10 +139,10 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   scene.observed = random_field(probe.grid(), 0.2, random);
   probe.stages().select_in_view();
   probe.stages().split_surfels();
-  probe.stages().settle_by_recent_views();  // sends the views
+  probe.views().prepare();
   Field<char> candidates = random_field(probe.grid(), density, random);
   for_each_voxel(candidates, [&](int i, int j, int k) {
-    if (scene.observed(i, j, k) || sum_of_directions(scene.grid, scene.observed, i, j, k).norm() < 0.05) candidates(i, j, k) = 0;
+    if (scene.observed(i, j, k) || sum_of_directions(scene.grid, scene.observed, Vector3i(i, j, k)).norm() < 0.05) candidates(i, j, k) = 0;
   });
   probe.set_observed(scene.observed);
   probe.set_candidates(candidates);
@@ -206,7 +188,7 @@ std::size_t check_creation(Camera camera, int old_surfels, double density, bool 
     const Surfel& surfel = by_slot[slots[n]];
     const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
     const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
-    const Vector3d mean = sum_of_directions(grid, scene.observed, v.x(), v.y(), v.z()).normalized();
+    const Vector3d mean = sum_of_directions(grid, scene.observed, v).normalized();
     const Truth ragged = refine ? !has_known_front(scene, v, mean) : Truth::no;
     if (refine)
       EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();

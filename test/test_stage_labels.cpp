@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "stages/reference_observed_space.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/stages_probe.hpp"
 
@@ -35,21 +36,14 @@ std::vector<Surfel> surfels_near_surfaces(const Scene& scene, int count, Random&
   return surfels;
 }
 
-/// Does the surfel lie where its column of observed voxels ends at a measured surface, or in the body behind the surface?
-/// @param pixel  of the column
+/// @param pixel  of the column that the surfel lies in
 Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, const Surfel& surfel, int* pixel) {
   const Vector3d p = scene.T_world_camera.inverse() * surfel.position.cast<double>();
   const Voxel voxel = voxel_of(scene.grid.to_grid(p), 1e-3);
-  const Intrinsics& camera = scene.camera.intrinsics;
-  const int s = voxel.index.x() - scene.grid.padding_i, t = voxel.index.y() - scene.grid.padding_j, k = voxel.index.z();
-  *pixel = t * camera.width + s;
+  const int s = voxel.index.x() - scene.grid.padding_i, t = voxel.index.y() - scene.grid.padding_j;
+  *pixel = t * scene.camera.intrinsics.width + s;
   if (voxel.open) return Truth::open;
-  if (s < 0 || t < 0 || s >= camera.width || t >= camera.height || k <= scene.grid.k_min) return Truth::no;
-  const double d = scene.image.depth[*pixel];
-  if (d <= 0) return Truth::no;  // no measurement, or nothing was met
-  const auto observed = [&](int layer) { return layer >= scene.grid.k_min && layer < scene.grid.size_k && layer_depth[layer] < d; };
-  const Truth in_body = !less(p.z(), d, 1e-5) && !less(d + scene.camera.config.surface_depth, p.z(), 1e-5);
-  return truth(observed(k - 1) && !observed(k)) || in_body;
+  return at_surface(scene.grid, scene.image, layer_depth, scene.camera.config.surface_depth, voxel.index, p.z());
 }
 
 /// @return how many surfels lie at surfaces

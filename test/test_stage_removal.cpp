@@ -17,12 +17,14 @@ using namespace reference;
 struct Expected {
   std::vector<Truth> removed;
   Field<Truth> occupied_voxels;
+  std::size_t closed = 0, on_thin_bodies = 0;  ///< that go for the gap alone; that would, were they not occupied
 };
 
-/// Removed: in an observed voxel, or (where that is asked for) with its back side, r / 4 behind it, seen by this frame.
+/// Removed: in an observed voxel, or (where that is asked for) with its back side, r / 4 behind it, seen by this frame, or frontier that
+/// this frame sees min_gap behind.
 Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& view, const std::vector<Surfel>& map,
                         const std::vector<ViewSurfel>& in_view, const Field<char>& observed) {
-  Expected expected = {{}, grid.field(Truth::no)};
+  Expected expected = {{}, grid.field(Truth::no), 0, 0};
   for (const ViewSurfel& s : in_view) {
     const Surfel& surfel = map[s.slot];
     const Voxel voxel = voxel_of(Vector3d(s.i, s.j, s.k), 2e-5);
@@ -34,6 +36,13 @@ Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& 
     Truth removed = truth(observed(v.x(), v.y(), v.z()));
     if (config.remove_buried)
       removed = removed || view_knows(view, (surfel.position - 0.25F * surfel.radius * surfel.normal).cast<double>());
+    if (config.min_gap > 0) {
+      const Vector3d behind = surfel.position.cast<double>() - config.min_gap * surfel.normal.cast<double>();
+      const Truth thin = view_knows(view, behind), frontier = truth(surfel.label == Label::kFrontier);
+      expected.closed += removed == Truth::no && (thin && frontier) == Truth::yes;
+      expected.on_thin_bodies += removed == Truth::no && (thin && !frontier) == Truth::yes;
+      removed = removed || (thin && frontier);
+    }
     if (voxel.open) removed = Truth::open;
     expected.removed.push_back(removed);
     Truth& occupied = expected.occupied_voxels(v.x(), v.y(), v.z());
@@ -42,17 +51,23 @@ Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& 
   return expected;
 }
 
-/// @return how many were removed
-std::size_t check_marks(Camera camera, Content content, int count, double density, bool remove_buried) {
+struct Marked {
+  std::size_t removed;
+  Expected expected;
+};
+
+Marked check_marks(Camera camera, Content content, int count, double density, bool remove_buried, double min_gap) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels, density " + std::to_string(density) +
-               (remove_buried ? ", buried ones too" : ""));
+               (remove_buried ? ", buried ones too" : "") + ", gaps of " + std::to_string(min_gap) + " m");
   camera.config.remove_buried = remove_buried;
+  camera.config.min_gap = min_gap;
   Random random(static_cast<unsigned>(count));
   const Nuvg grid(camera.intrinsics, camera.config);
   StagesProbe probe(camera.config);
   const SeenView view = {random_image(camera, content, random), random.pose(2, 3)};
   probe.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
   const std::vector<Surfel> map = probe.map().download();
+  if (count > 10) probe.kill({7, 2, 9});  // so that a surfel's number in view is not its slot
   probe.stages().begin_frame(view.image, view.T_world_camera, 2);
   probe.stages().select_in_view();
   EXPECT_EQ(probe.stages().split_surfels(), 0u);
@@ -74,20 +89,21 @@ std::size_t check_marks(Camera camera, Content content, int count, double densit
     }
   }
   expect_equal("voxels with surfels", expected.occupied_voxels, probe.occupied_voxels());
-  return removed;
+  return {removed, expected};
 }
 
 TEST(StageRemoval, RandomSurfels) {
   for (const Camera& camera : cameras())
     for (const Content content : {Content::mixed, Content::all_valid, Content::all_invalid})
-      for (const bool remove_buried : {false, true}) check_marks(camera, content, 300, 0.3, remove_buried);
+      for (const double min_gap : {0.0, 0.05})
+        for (const bool remove_buried : {false, true}) check_marks(camera, content, 300, 0.3, remove_buried, min_gap);
 }
 
 TEST(StageRemoval, NothingAndEverythingObserved) {
   const Camera camera = cameras().front();
   for (const int count : {0, 1, 64, 65, 200}) {
-    EXPECT_EQ(check_marks(camera, Content::mixed, count, 0, false), 0u);
-    const std::size_t removed = check_marks(camera, Content::mixed, count, 1, false);
+    EXPECT_EQ(check_marks(camera, Content::mixed, count, 0, false, 0).removed, 0u);
+    const std::size_t removed = check_marks(camera, Content::mixed, count, 1, false, 0).removed;
     EXPECT_LE(removed, static_cast<std::size_t>(count));
     EXPECT_TRUE(count < 64 || removed > 0);
   }
@@ -95,7 +111,22 @@ TEST(StageRemoval, NothingAndEverythingObserved) {
 
 TEST(StageRemoval, BuriedSurfelsGo) {
   const Camera camera = cameras().front();
-  EXPECT_GT(check_marks(camera, Content::all_valid, 300, 0, true), 5u);
+  EXPECT_GT(check_marks(camera, Content::all_valid, 300, 0, true, 0).removed, 5u);
+}
+
+/// Gaps down to a tenth of a voxel; the surfaces of bodies as thin stay.
+TEST(StageRemoval, FrontierOnThinGapsGoes) {
+  for (const double min_gap : {0.003, 0.03, 0.3}) {
+    std::size_t closed = 0, on_thin_bodies = 0;
+    for (const Camera& camera : cameras())
+      for (const bool remove_buried : {false, true}) {
+        const Marked marked = check_marks(camera, Content::all_valid, 600, 0, remove_buried, min_gap);
+        closed += marked.expected.closed;
+        on_thin_bodies += marked.expected.on_thin_bodies;
+      }
+    EXPECT_GT(closed, small_tests() ? 5u : 100u) << "nothing was tested";
+    EXPECT_GT(on_thin_bodies, small_tests() ? 1u : 50u) << "nothing was tested";
+  }
 }
 
 /// The numbers of set bits in the order of words and, in them, of layers.

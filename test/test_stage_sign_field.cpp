@@ -79,9 +79,7 @@ using MakeSurfels = std::function<std::vector<ViewSurfel>(const Grid&, const Lim
 void check(const Camera& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
   SCOPED_TRACE(camera.name);
   std::optional<SignField> expected;
-  std::vector<Commands*> variants = {&test_commands()};
-  if (!small_tests()) variants.push_back(&other_commands());  // an interpreter takes minutes for 64 work items
-  for (Commands* commands : variants) {
+  for (Commands* commands : {&test_commands(), &other_commands()}) {
     SCOPED_TRACE(commands->device().is_cpu ? "one work item a tile" : "64 work items a tile");
     Random random(1);
     StagesProbe probe(camera.config, *commands);

@@ -38,6 +38,7 @@ struct Config {
 
   // Removal, creation and labels (paper 3.4, 3.5)
   bool remove_buried = true;
+  double min_gap = 0.005;
   bool refine_surfels = true;
   double surface_depth = 0.03;
 
@@ -84,6 +85,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.recent_view_distance);
   visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
   visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
+  visit(FieldInfo{"min_gap", "m", "frontier on a sheet of unknown thinner than this is left out; 0: all is kept", 0, 1}, config.min_gap);
   visit(FieldInfo{"refine_surfels", "", "new surfels stand near the boundary within their voxel, and their normals end in known space"},
         config.refine_surfels);
   visit(
@@ -98,6 +100,9 @@ Config load_config(const std::string& path);
 
 /// Sets one field from text, as --set key=value does. @throws Error  no such field (with the nearest name), or not of its type
 void set_field(Config& config, const std::string& name, const std::string& value);
+
+/// "; did you mean 'x'?" with the name nearest to `name` among Config's fields and `more`, or where to find all names if none is near.
+std::string suggestion(const std::string& name, const std::vector<std::string>& more = {});
 
 /// The configuration as YAML that load_config reads back.
 std::string to_yaml(const Config& config);

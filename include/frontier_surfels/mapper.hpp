@@ -48,6 +48,7 @@ class Mapper {
   void reset();
 
   Statistics statistics() const;
+  std::size_t size() const;  ///< surfels in the map
   std::uint64_t sequence() const;
   const Config& config() const;
 

@@ -6,9 +6,11 @@
 #include <iterator>
 
 namespace frontier_surfels::replay {
-namespace {
 
-constexpr double kColorTolerance = 0.030;  // [s]
+using messages::kColorTolerance;
+using messages::strip_slash;
+
+namespace {
 
 bool is_topic(const rosbag::ConnectionInfo& connection, const char* name) { return strip_slash(connection.topic) == name; }
 
@@ -29,7 +31,7 @@ ImageWindow::ImageWindow(const rosbag::Bag& bag, const std::string& topic)
     : view_(bag, [topic](const rosbag::ConnectionInfo* connection) { return connection->topic == topic; }), next_(view_.begin()) {}
 
 ImageMessage ImageWindow::nearest(const ros::Time& stamp) {
-  const auto offset = [&](const ImageMessage& image) { return (image.header().stamp - stamp).toSec(); };
+  const auto offset = [&](const ImageMessage& image) { return messages::seconds(stamp, image.header().stamp); };
   while (next_ != view_.end() && (window_.empty() || offset(window_.back()) < kColorTolerance)) {
     const ImageMessage image = to_image_message(*next_);
     ++next_;
@@ -112,7 +114,7 @@ void BagSource::choose_world(const std::string& wanted) {
 
 std::optional<RecordedFrame> BagSource::next() {
   while (done_ < selection_.count) {
-    const rosbag::MessageInstance message = *next_depth_;
+    const rosbag::MessageInstance& message = message_.emplace(*next_depth_);
     const std::size_t index = selection_.first + done_ * selection_.stride;
     if (++done_ < selection_.count) std::advance(next_depth_, static_cast<std::ptrdiff_t>(selection_.stride));
     const std::string frame = "Frame " + std::to_string(index) + " of " + topics_.depth + " is passed over: ";
@@ -135,7 +137,7 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   RecordedFrame frame;
   frame.stamp = header.stamp.toSec();
   frame.T_world_camera = transforms_.T_world_frame(world_, strip_slash(header.frame_id), header.stamp);
-  frame.depth = depth_image(image);
+  frame.depth = messages::depth_image(image);
   frame.intrinsics = intrinsics_at(header.stamp, frame.depth.size());
   if (color_images_) frame.color = color_at(header.stamp, frame.depth.size());
   return frame;
@@ -146,15 +148,7 @@ Intrinsics BagSource::intrinsics_at(const ros::Time& stamp, const cv::Size& imag
   auto camera = std::upper_bound(cameras_.begin(), cameras_.end(), stamp,
                                  [](const ros::Time& value, const auto& element) { return value < element.first; });
   if (camera != cameras_.begin()) --camera;
-  Intrinsics intrinsics = to_intrinsics(camera->second);
-  const cv::Size said(intrinsics.width, intrinsics.height);
-  if (said.width > 0 && said.height > 0 && said != image_size) {
-    throw BadFrame("the image has " + std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
-                   " pixels, but its camera_info says " + std::to_string(said.width) + "x" + std::to_string(said.height));
-  }
-  intrinsics.width = image_size.width;
-  intrinsics.height = image_size.height;
-  return intrinsics;
+  return messages::to_intrinsics(camera->second, image_size);
 }
 
 /// Colour is an extra: what is wrong with it costs no frame.
@@ -166,7 +160,7 @@ cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) 
       note_once("Some depth images have no image on " + topics_.color + " within 30 ms" + without);
       return {};
     }
-    const cv::Mat color = color_image(image);
+    const cv::Mat color = messages::color_image(image);
     if (color.size() == depth_size) return color;
     note_once("Some images on " + topics_.color + " have another size than the depth image" + without);
   } catch (const std::runtime_error& fault) {  // BadFrame, or rosbag's

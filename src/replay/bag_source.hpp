@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "bag_messages.hpp"
 #include "bag_topics.hpp"
 #include "bag_transforms.hpp"
 #include "frontier_surfels/replay/frame_source.hpp"
+#include "ros/conversions.hpp"
 #include "selection.hpp"
 
 namespace frontier_surfels::replay {
@@ -42,6 +42,12 @@ class BagSource : public FrameSource {
   const std::vector<std::string>& skipped() const override { return skipped_; }
   const std::vector<std::string>& notes() const override { return notes_; }
 
+  const rosbag::Bag& bag() const { return bag_; }
+  const BagTopics& topics() const { return topics_; }
+
+  /// The depth message of the frame that next() gave last.
+  const rosbag::MessageInstance& message() const { return *message_; }
+
  private:
   void open(const std::string& path);
   void read_transforms_and_cameras();
@@ -58,6 +64,7 @@ class BagSource : public FrameSource {
   std::string world_;
   std::unique_ptr<rosbag::View> depth_view_;
   rosbag::View::iterator next_depth_;
+  std::optional<rosbag::MessageInstance> message_;
   std::unique_ptr<ImageWindow> color_images_;
   Selection selection_;
   std::size_t done_ = 0;  ///< of the selection

@@ -8,6 +8,9 @@
 #include <vector>
 
 namespace frontier_surfels::replay {
+
+using messages::strip_slash;
+
 namespace {
 
 constexpr const char* kInfoType = "sensor_msgs/CameraInfo";
@@ -49,11 +52,11 @@ std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& m
   if (!message) return std::nullopt;
   const bool compressed = static_cast<bool>(message.compressed);
   try {
-    return ImageTopic{name, compressed, true, depth_image(message).size()};
+    return ImageTopic{name, compressed, true, messages::depth_image(message).size()};
   } catch (const BadFrame&) {  // no depth: colour, perhaps
   }
   try {
-    return ImageTopic{name, compressed, false, color_image(message).size()};
+    return ImageTopic{name, compressed, false, messages::color_image(message).size()};
   } catch (const BadFrame&) {
     return std::nullopt;
   }

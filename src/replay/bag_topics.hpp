@@ -6,10 +6,12 @@
 
 #include <string>
 
-#include "bag_messages.hpp"
 #include "frontier_surfels/replay/frame_source.hpp"
+#include "ros/conversions.hpp"
 
 namespace frontier_surfels::replay {
+
+using messages::ImageMessage;
 
 /// Names as they stand in the bag.
 struct BagTopics {

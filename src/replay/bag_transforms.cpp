@@ -4,10 +4,13 @@
 
 #include <cmath>
 
-#include "bag_messages.hpp"
 #include "frontier_surfels/types.hpp"
+#include "ros/conversions.hpp"
 
 namespace frontier_surfels::replay {
+
+using messages::strip_slash;
+
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-2;
@@ -22,17 +25,17 @@ bool is_usable(const geometry_msgs::TransformStamped& transform) {
   return finite && named && transform.header.frame_id != transform.child_frame_id && std::abs(norm - 1) <= kQuaternionTolerance;
 }
 
-/// tf2 itself accepts less of a deviation from length 1.
+}  // namespace
+
 void normalise(geometry_msgs::Quaternion& q) {
-  const double norm = Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm();
-  if (std::abs(norm - 1) < 1e-6) return;  // rounding: stays bit for bit
+  const double norm = Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm(), deviation = std::abs(norm - 1);
+  const bool is_rounding = deviation < 1e-6;  // stays bit for bit
+  if (is_rounding || !(deviation <= kQuaternionTolerance)) return;
   q.x /= norm;
   q.y /= norm;
   q.z /= norm;
   q.w /= norm;
 }
-
-}  // namespace
 
 BagTransforms::BagTransforms() : buffer_(ros::Duration(kForever)) {}
 
@@ -81,9 +84,7 @@ Eigen::Isometry3d BagTransforms::T_world_frame(const std::string& world, const s
   if (stamp.isZero()) throw BadFrame("its stamp is 0, which is no time");
   if (frame == world) throw BadFrame("its frame is the world frame '" + world + "' itself");
   try {
-    const geometry_msgs::Transform transform = buffer_.lookupTransform(world, frame, stamp).transform;
-    const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z);
-    return Eigen::Translation3d(transform.translation.x, transform.translation.y, transform.translation.z) * rotation.normalized();
+    return messages::to_isometry(buffer_.lookupTransform(world, frame, stamp).transform);
   } catch (const tf2::TransformException& error) {
     throw BadFrame("its pose is not known (" + std::string(error.what()) + ")");
   }

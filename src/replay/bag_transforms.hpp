@@ -12,6 +12,9 @@
 
 namespace frontier_surfels::replay {
 
+/// Corrects a length that is nearly 1: tf2 itself accepts less of a deviation. Anything else is left as it is.
+void normalise(geometry_msgs::Quaternion& q);
+
 /// Frame names may have leading slashes everywhere; tf2 never sees them.
 class BagTransforms {
  public:

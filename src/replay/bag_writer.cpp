@@ -12,13 +12,17 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-#include "bag_messages.hpp"
+#include "ros/conversions.hpp"
 
 namespace frontier_surfels::replay {
+
+using messages::CompressedDepthHeader;
+using messages::InverseDepthQuantisation;
+
 namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
-constexpr float kMetresPerMillimetre = 0.001f;
+constexpr float kMillimetresPerMetre = 1000.0f;
 
 /// The inverse depth's resolution is that of 16 bits from 1 m on; compressed_depth_image_transport's own choice.
 InverseDepthQuantisation default_quantisation() {
@@ -32,7 +36,7 @@ cv::Mat to_metres(const cv::Mat& depth) {
   if (depth.type() == CV_32FC1) return depth;
   cv::Mat metres(depth.size(), CV_32FC1);
   std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [](std::uint16_t value) {
-    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) * kMetresPerMillimetre;
+    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) / kMillimetresPerMetre;
   });
   return metres;
 }
@@ -46,7 +50,7 @@ cv::Mat to_millimetres(const cv::Mat& depth) {
   if (depth.type() == CV_16UC1) return depth;
   cv::Mat millimetres(depth.size(), CV_16UC1);
   std::transform(depth.begin<float>(), depth.end<float>(), millimetres.begin<std::uint16_t>(),
-                 [](float value) { return to_sixteen_bits(value / kMetresPerMillimetre); });
+                 [](float value) { return to_sixteen_bits(value * kMillimetresPerMetre); });
   return millimetres;
 }
 

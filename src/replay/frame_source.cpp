@@ -11,32 +11,6 @@
 
 namespace frontier_surfels::replay {
 
-DepthFrame RecordedFrame::view() const {
-  if (depth.type() != CV_16UC1 && depth.type() != CV_32FC1)
-    throw BadFrame("a depth image must have one channel of 16-bit mm or of 32-bit m");
-
-  DepthFrame frame;
-  frame.stamp = stamp;
-  frame.intrinsics = intrinsics;
-  frame.T_world_camera = T_world_camera;
-  frame.depth.width = depth.cols;
-  frame.depth.height = depth.rows;
-  frame.depth.step = depth.step[0];
-  frame.depth.encoding = depth.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
-  frame.depth.data = depth.data;
-  if (color.empty()) return frame;
-
-  if (color.type() != CV_8UC3) throw BadFrame("a colour image must have three channels of 8 bits");
-  ColorImage view;
-  view.width = color.cols;
-  view.height = color.rows;
-  view.step = color.step[0];
-  view.order = ColorImage::Order::kBgr;
-  view.data = color.data;
-  frame.color = view;
-  return frame;
-}
-
 Selection select_frames(const SourceOptions& options, std::size_t frames, const std::string& path) {
   if (options.stride < 1) throw Error("The stride must be 1 or more, not " + std::to_string(options.stride) + ".");
   if (options.first < 0) throw Error("The first frame must be 0 or more, not " + std::to_string(options.first) + ".");

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
 #include "frontier_surfels/replay/synthetic_room.hpp"
@@ -19,6 +20,8 @@ struct Options {
   int frames = 60;
   int width = 640;
   int height = 480;
+  double focal = 0;  ///< [pixel]; 0: of a Kinect's field of view
+  replay::CameraPath path = replay::CameraPath::kOrbit;
   replay::SensorModel sensor;
 };
 
@@ -65,7 +68,8 @@ void write_pose(std::ofstream& file, const replay::RecordedFrame& frame) {
 }
 
 void write_sequence(const Options& options) {
-  const auto camera = replay::synthetic_camera(options.width, options.height);
+  auto camera = replay::synthetic_camera(options.width, options.height);
+  if (options.focal > 0) camera.fx = camera.fy = options.focal;
   const fs::path folder = options.output;
   if (fs::exists(folder / "depth") && !fs::is_empty(folder / "depth")) {
     throw FileError((folder / "depth").string() + " already has images: choose another folder, or remove it.");
@@ -78,7 +82,7 @@ void write_sequence(const Options& options) {
 
   const replay::Room room;
   for (int index = 0; index < options.frames; ++index) {
-    const replay::RecordedFrame frame = room.render(index, options.frames, camera, options.sensor);
+    const replay::RecordedFrame frame = room.render(index, options.frames, camera, options.sensor, options.path);
     char name[32];
     std::snprintf(name, sizeof(name), "%06d", index);
     write_image(folder / "depth" / (std::string(name) + ".png"), frame.depth);
@@ -97,7 +101,16 @@ int main(int argc, char** argv) {
   app.failure_message(CLI::FailureMessage::help);
   app.option_defaults()->always_capture_default();
   app.add_option("OUT", options.output, "the folder to be written")->required();
-  app.add_option("--frames", options.frames, "once around the table in so many")->check(CLI::Range(1, 999999));
+  app.add_option("--frames", options.frames, "so many from the path's beginning to its end")->check(CLI::Range(1, 999999));
+  const std::map<std::string, replay::CameraPath> paths = {{"orbit", replay::CameraPath::kOrbit},
+                                                           {"turn", replay::CameraPath::kTurn},
+                                                           {"walk", replay::CameraPath::kWalk},
+                                                           {"close", replay::CameraPath::kClose}};
+  app.add_option("--path", options.path,
+                 "of the camera: around the table, a turn on the spot, a walk into the corridor, or close to things")
+      ->transform(CLI::CheckedTransformer(paths))
+      ->default_str("orbit");
+  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect's field of view")->check(CLI::Range(0.0, 1e5));
   app.add_flag("--noise", options.sensor.noise, "Kinect-like: a deviation of 1.425e-3 z^2, in steps of disparity");
   app.add_option("--dropouts", options.sensor.dropouts, "share of pixels lost in blobs; also at edges and grazing angles")
       ->check(CLI::Range(0.0, 0.9));

@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <optional>
 
 #include "frontier_surfels/ply.hpp"
+#include "replay/live_replay.hpp"
 #include "replay/report_page.hpp"
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
@@ -30,8 +32,8 @@ struct Options {
   Config config;
   double octomap_resolution = 0.01;  ///< [m]; 0: off
   bool exact = true;
-  bool live = false;
   std::optional<Sweep> sweep;
+  std::optional<LiveOptions> live;
 };
 
 /// The command line as text; what needs the configuration is read from it afterwards.
@@ -40,7 +42,9 @@ struct RawOptions {
   std::vector<std::string> settings;
   std::optional<int> threads;
   std::string sweep;
+  std::string mapper;
   bool no_exact = false;
+  bool live = false;
 };
 
 volatile sig_atomic_t interrupted = 0;
@@ -75,7 +79,8 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   app.add_flag("--no-exact", raw.no_exact, "leave the exact test out");
   app.add_option("--threads", raw.threads, "threads of the mapper and the scorers; 0: all")->type_name("N")->check(CLI::NonNegativeNumber);
   app.add_option("--sweep", raw.sweep, "repeat the run over N values of a parameter")->type_name("PARAM=LO:HI:N");
-  app.add_flag("--live", options.live, "replay into a running mapper through its topics");
+  app.add_flag("--live", raw.live, "bags: publish it into a mapper node that runs already, and score the map that it publishes");
+  app.add_option("--mapper", raw.mapper, "name of that node, mapper unless given")->type_name("NAME")->needs("--live");
   app.add_flag_callback(
       "--parameters",
       [] {
@@ -103,15 +108,33 @@ void read_config(const RawOptions& raw, Config& config) {
   if (!problems.empty()) throw CLI::ValidationError("", problems);
 }
 
+/// @throws CLI::ValidationError for what a running mapper has been told already
+LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& ros_arguments) {
+  if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
+    throw CLI::ValidationError("--live",
+                               "the running mapper's own parameters count: set them where it is started, and leave --config, --set, "
+                               "--threads and --sweep out");
+  }
+  LiveOptions live;
+  if (!raw.mapper.empty()) live.mapper = raw.mapper;
+  live.ros_arguments = ros_arguments;
+  return live;
+}
+
 /// @throws CLI::Error (also for help, with exit code 0), Error
 Options parse(int argc, char** argv) {
   Options options;
   RawOptions raw;
+  std::vector<std::string> arguments(std::make_reverse_iterator(argv + argc), std::make_reverse_iterator(argv + 1));  // as CLI wants them
+  const auto is_ours = [](const std::string& argument) { return argument.find(":=") == std::string::npos; };
+  const auto ros = std::stable_partition(arguments.begin(), arguments.end(), is_ours);  // roslaunch adds some of its own
+  const std::vector<std::string> ros_arguments(ros, arguments.end());
+  arguments.erase(ros, arguments.end());
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
                "replay_score");
   declare_options(app, options, raw);
   try {
-    app.parse(argc, argv);
+    app.parse(arguments);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
     // The upper bound catches millimetres, the lower one more voxels than fit any memory; NaN fails both.
@@ -120,6 +143,7 @@ Options parse(int argc, char** argv) {
       throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
     read_config(raw, options.config);
     options.exact = !raw.no_exact;
+    if (raw.live) options.live = live_options(raw, ros_arguments);
     if (!raw.sweep.empty()) try {
         options.sweep = parse_sweep(raw.sweep, options.config);
       } catch (const Error& error) {
@@ -171,18 +195,20 @@ void tell_skipped(const std::vector<std::string>& skipped) {
 }
 
 void replay_and_score(const Options& options) {
-  if (options.live) throw Error("--live is not available yet: leave it out to replay offline.");
   const fs::path folder = options.report;
   catch_first_interrupt();
+  auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
+  const Config config = live ? live->config() : options.config;
   prepare_folder(folder);
 
-  Yardsticks yardsticks(options.config, options.octomap_resolution, options.exact);
-  const Run run = map_recording(options.recording, options.config, &yardsticks, stop_requested);
+  Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
+  const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
+  live.reset();  // scoring takes its time: the mapper must not send to somebody who does not listen
   tell_skipped(run.skipped);
   if (run.stopped) std::cerr << "Stopped after " << run.frames.size() << " frames: these are scored and written. Once more ends at once.\n";
   write_map(folder, run);
 
-  const Scores scores = score(run.surfels, yardsticks, options.config.threads);
+  const Scores scores = score(run.surfels, yardsticks, config.threads);
   const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
   write_scores(folder, yardsticks, scores, summary);
   std::cout << result_table(summary) << std::flush;

@@ -10,19 +10,6 @@ namespace {
 
 constexpr std::size_t kSegments = 40000;  // of the exact test's completeness: standard error below 0.25 % of any share
 
-/// [10^6 byte]; Linux gives KiB.
-double peak_rss_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return usage.ru_maxrss * 1024.0 / 1e6;
-}
-
-Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped) {
-  if (skipped.empty()) return Error("'" + recording.path + "' has no frame in the chosen part: check --first, --last and --stride.");
-  return Error("No frame of '" + recording.path + "' could be used; " + std::to_string(skipped.size()) +
-               " skipped, the first because: " + skipped.front());
-}
-
 }  // namespace
 
 Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
@@ -75,6 +62,18 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
   run.statistics = mapper.statistics();
   run.peak_rss_mb = peak_rss_mb();
   return run;
+}
+
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss * 1024.0 / 1e6;  // Linux gives KiB
+}
+
+Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped) {
+  if (skipped.empty()) return Error("'" + recording.path + "' has no frame in the chosen part: check --first, --last and --stride.");
+  return Error("No frame of '" + recording.path + "' could be used; " + std::to_string(skipped.size()) +
+               " skipped, the first because: " + skipped.front());
 }
 
 Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads) {

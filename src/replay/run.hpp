@@ -69,6 +69,12 @@ struct Run {
 /// @throws Error      also when not one frame could be used
 Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop);
 
+/// What to say when that was not one.
+Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped);
+
+/// [10^6 byte] of this process, so far.
+double peak_rss_mb();
+
 /// Scores of a map; empty where there is no such yardstick.
 struct Scores {
   std::optional<scoring::OctomapScore> octomap;

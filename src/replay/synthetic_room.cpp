@@ -179,14 +179,14 @@ struct View {
   cv::Mat cos_incidence;  ///< CV_32FC1
 };
 
-View render_view(const Room& room, int index, int frames, const Intrinsics& intrinsics) {
+View render_view(const Room& room, CameraPath path, int index, int frames, const Intrinsics& intrinsics) {
   const cv::Size size(intrinsics.width, intrinsics.height);
   View view{{}, cv::Mat::zeros(size, CV_32FC1)};
   view.frame.stamp = kFirstStamp + index / kFrameRate;
   view.frame.depth = cv::Mat::zeros(size, CV_32FC1);
   view.frame.color = cv::Mat::zeros(size, CV_8UC3);
   view.frame.intrinsics = intrinsics;
-  view.frame.T_world_camera = orbit_pose(index, frames);
+  view.frame.T_world_camera = camera_pose(path, index, frames);
   const Vector3d origin = view.frame.T_world_camera.translation();
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
@@ -239,33 +239,17 @@ double Room::distance(const Vector3d& p_world) const {
   return nearest;
 }
 
-RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics) const {
-  return render_view(*this, index, frames, intrinsics).frame;
+RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics, CameraPath path) const {
+  return render_view(*this, path, index, frames, intrinsics).frame;
 }
 
-RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor) const {
-  View view = render_view(*this, index, frames, intrinsics);
+RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor, CameraPath path) const {
+  View view = render_view(*this, path, index, frames, intrinsics);
   view.frame.depth = measure(view.frame.depth, view.cos_incidence, sensor, index);
   return view.frame;
 }
 
-/// Around an ellipse, looking across the table and to both sides of it in turn; the hand sways and trembles a little.
-Eigen::Isometry3d orbit_pose(int index, int frames) {
-  const double angle = 2 * M_PI * index / std::max(1, frames);
-  const auto sway = [&](double cycles, double phase) { return std::sin(cycles * angle + phase); };
-  const auto tremble = [&](double rate) { return std::sin(rate * index) + std::sin(1.7 * rate * index + 1); };
-
-  const Vector3d p_world(1.2 * std::cos(angle) + 0.006 * tremble(0.9), 1.5 * std::sin(angle) + 0.006 * tremble(1.1),
-                         1.35 + 0.12 * sway(4, 0.4) + 0.006 * tremble(1.3));
-  const double yaw = std::atan2(-p_world.y(), -p_world.x()) + 0.45 * sway(3, 0.9) + 0.008 * tremble(0.7);
-  const double pitch_down = 0.35 + 0.15 * sway(5, 0) + 0.008 * tremble(0.8);
-  const double roll = 0.04 * sway(2, 0.3) + 0.008 * tremble(1.2);
-
-  const Eigen::Quaterniond forward_to_optical(-0.5, 0.5, -0.5, 0.5);  // x forward, z up -> z forward, y down
-  const Eigen::Quaterniond rotation = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch_down, Vector3d::UnitY()) *
-                                      Eigen::AngleAxisd(roll, Vector3d::UnitX()) * forward_to_optical;
-  return Eigen::Translation3d(p_world) * rotation.normalized();
-}
+Eigen::Isometry3d orbit_pose(int index, int frames) { return camera_pose(CameraPath::kOrbit, index, frames); }
 
 Intrinsics synthetic_camera(int width, int height) {
   const double scale_x = width / 640.0, scale_y = height / 480.0;

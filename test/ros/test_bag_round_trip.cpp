@@ -79,7 +79,7 @@ TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   }
 }
 
-/// The mapper takes float(mm) * 0.001f; maps are the same bit for bit only if the bag has those very floats.
+/// The mapper takes float(mm) / 1000; maps are the same bit for bit only if the bag has those very floats.
 TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
   const std::vector<RecordedFrame> written = room_frames(), read = write_and_read({});
   ASSERT_EQ(read.size(), written.size());
@@ -94,7 +94,7 @@ TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
         if (millimetres == 0) {
           EXPECT_TRUE(std::isnan(metres));
         } else {
-          EXPECT_EQ(metres, static_cast<float>(millimetres) * 0.001f);
+          EXPECT_EQ(metres, static_cast<float>(millimetres) / 1000.0F);
           ++measured;
         }
       }
@@ -132,7 +132,7 @@ TEST_F(RoundTrip, CompressedMetresAreQuantisedInInverseDepth) {
     if (millimetres == 0) {
       EXPECT_TRUE(std::isnan(metres));
     } else {
-      const float z = static_cast<float>(millimetres) * 0.001f;
+      const float z = static_cast<float>(millimetres) / 1000.0F;
       EXPECT_NEAR(metres, z, 0.51 * z * z / (100 * 101));
     }
   }

@@ -62,6 +62,7 @@ inline Camera make_camera(int width, int height, double fx, double fy, int layer
   camera.name = std::to_string(width) + " x " + std::to_string(height) + " pixels, " + std::to_string(layers) + " layers";
   camera.intrinsics = {fx, fy, 0.5 * width - 0.43, 0.5 * height - 0.61, width, height};
   camera.config.decimation = 1;
+  camera.config.min_gap = 0;  // only the tests of thin gaps want them closed
   camera.config.padding_i = padding[0];
   camera.config.padding_j = padding[1];
   camera.config.padding_k = padding[2];

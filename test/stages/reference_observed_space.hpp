@@ -1,5 +1,7 @@
-/// Observed space C~, literally: for every pixel and every layer - paper 3.3, eq. (9)-(11).
+/// Observed space C~, literally: for every pixel and every layer - paper 3.3, eq. (9)-(11). And what is asked of it beside a voxel.
 #pragma once
+
+#include <vector>
 
 #include "reference_grid.hpp"
 #include "working_image.hpp"
@@ -39,6 +41,34 @@ inline Field<Truth> observed_space(const Nuvg& grid, const WorkingImage& image, 
     }
   }
   return observed;
+}
+
+/// Does a column of observed voxels end in voxel v at a measured surface, or does a point of v, at depth z, lie in the body behind it?
+inline Truth at_surface(const Nuvg& grid, const WorkingImage& image, const std::vector<float>& layer_depth, double surface_depth,
+                        const Vector3i& v, double z) {
+  const int s = v.x() - grid.padding_i, t = v.y() - grid.padding_j, k = v.z();
+  if (s < 0 || t < 0 || s >= grid.camera.width || t >= grid.camera.height || k <= grid.k_min) return Truth::no;
+  const double d = image.depth[t * grid.camera.width + s];
+  if (d <= 0) return Truth::no;  // no measurement, or nothing was met
+  const auto observed = [&](int layer) { return layer >= grid.k_min && layer < grid.size_k && layer_depth[layer] < d; };
+  return truth(observed(k - 1) && !observed(k)) || (!less(z, d, 1e-5) && !less(d + surface_depth, z, 1e-5));
+}
+
+/// Unit vectors from voxel v to those of the 26 around it that have C~ = 1.
+inline std::vector<Vector3d> directions(const Nuvg& grid, const Field<char>& observed, const Vector3i& v) {
+  std::vector<Vector3d> found;
+  for (int n = 0; n < 27; ++n) {
+    const Vector3i u = v + Vector3i(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
+    if (u == v || !grid.contains(u) || !observed(u.x(), u.y(), u.z())) continue;
+    found.push_back((grid.center_of(u.x(), u.y(), u.z()) - grid.center_of(v.x(), v.y(), v.z())).normalized());
+  }
+  return found;
+}
+
+inline Vector3d sum_of_directions(const Nuvg& grid, const Field<char>& observed, const Vector3i& v) {
+  Vector3d sum = Vector3d::Zero();
+  for (const Vector3d& direction : directions(grid, observed, v)) sum += direction;
+  return sum;
 }
 
 }  // namespace frontier_surfels::reference

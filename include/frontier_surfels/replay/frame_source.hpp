@@ -1,28 +1,14 @@
 /// Recorded frames one after the other, whatever they were recorded in.
 #pragma once
 
-#include <cmath>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "frontier_surfels/types.hpp"
+#include "frontier_surfels/replay/recorded_frame.hpp"
 
 namespace frontier_surfels::replay {
-
-/// A frame that owns its images, in this machine's byte order.
-struct RecordedFrame {
-  double stamp = 0;  ///< [s]
-  cv::Mat depth;     ///< CV_16UC1 [mm] or CV_32FC1 [m]
-  cv::Mat color;     ///< CV_8UC3, BGR, registered to depth; empty where there is none
-  Intrinsics intrinsics;
-  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
-
-  /// A view of this frame; valid as long as this.
-  DepthFrame view() const;
-};
 
 /// Which part of a recording is read, and where its data are found in a bag.
 struct SourceOptions {

@@ -38,6 +38,14 @@ struct SensorModel {
   std::uint64_t seed = 1;  ///< the same for the same seed and frame index, everywhere
 };
 
+/// What the hand does that holds the camera.
+enum class CameraPath {
+  kOrbit,  ///< goes once around the table, looking at it
+  kTurn,   ///< stays where it is and turns once around: rotation only
+  kWalk,   ///< walks along the furniture, through the door and into the corridor
+  kClose,  ///< moves along shelf and table at 0.5 to 0.9 m
+};
+
 /// 4 x 5 x 2.5 m with a table, a chair, a shelf, a sofa, a cupboard, round things, and an open door to a corridor. Nothing is outside: a
 /// ray from inside always meets something.
 class Room {
@@ -57,17 +65,21 @@ class Room {
 
   bool inside_solid(const Eigen::Vector3d& p_world) const { return distance(p_world) < 0; }
 
-  /// Exact view, depth CV_32FC1 [m], with colour. Frame `index` of `frames` on the way around, 30 a second.
-  RecordedFrame render(int index, int frames, const Intrinsics& intrinsics) const;
+  /// Exact view, depth CV_32FC1 [m], with colour. Frame `index` of `frames` on the way, 30 a second.
+  RecordedFrame render(int index, int frames, const Intrinsics& intrinsics, CameraPath path = CameraPath::kOrbit) const;
 
   /// The same view as the sensor gives it: depth CV_16UC1 [mm].
-  RecordedFrame render(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor) const;
+  RecordedFrame render(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor,
+                       CameraPath path = CameraPath::kOrbit) const;
 
  private:
   std::vector<Solid> solids_;
 };
 
-/// Pose of the optical frame (x right, y down, z forward) in a hand that goes once around the table in `frames` frames.
+/// Pose of the optical frame (x right, y down, z forward) in frame `index` of `frames` on a path, in a hand that trembles.
+Eigen::Isometry3d camera_pose(CameraPath path, int index, int frames);
+
+/// The same on the way around the table.
 Eigen::Isometry3d orbit_pose(int index, int frames);
 
 /// Kinect-like pinhole camera with fx != fy and its centre off the image's.

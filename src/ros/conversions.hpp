@@ -1,6 +1,7 @@
-/// Images and cameras of ROS messages as this library wants them.
+/// Images, cameras and poses of ROS messages as this library wants them.
 #pragma once
 
+#include <geometry_msgs/Transform.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
@@ -10,7 +11,7 @@
 
 #include "frontier_surfels/types.hpp"
 
-namespace frontier_surfels::replay {
+namespace frontier_surfels::messages {
 
 /// An image as it was recorded, raw or compressed: one of the two is set.
 struct ImageMessage {
@@ -32,6 +33,20 @@ cv::Mat color_image(const ImageMessage& message);
 /// Width and height are 0 where the message does not say them. @throws BadFrame
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info);
 
+/// The same for the depth images that come with it, of `image_size`. @throws BadFrame if it is of another size
+Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& image_size);
+
+/// A rigid transform, of whatever quaternion. @throws BadFrame if it is not finite
+Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
+
+/// Colour belongs to a depth image if it was taken so little before or after it [s].
+constexpr double kColorTolerance = 0.030;
+
+/// From one time to the other [s]. ros::Duration throws where stamps are senseless.
+inline double seconds(const ros::Time& from, const ros::Time& to) {
+  return 1e-9 * static_cast<double>(static_cast<std::int64_t>(to.toNSec() - from.toNSec()));
+}
+
 /// A name as tf2 wants it: "/world" -> "world".
 std::string strip_slash(const std::string& name);
 
@@ -48,4 +63,4 @@ struct CompressedDepthHeader {
 };
 static_assert(sizeof(CompressedDepthHeader) == 12, "the header is read and written as it lies in memory");
 
-}  // namespace frontier_surfels::replay
+}  // namespace frontier_surfels::messages

@@ -1,7 +1,8 @@
-#include "bag_messages.hpp"
+#include "ros/conversions.hpp"
 
 #include <boost/predef/other/endian.h>
 #include <cv_bridge/cv_bridge.h>
+#include <image_geometry/pinhole_camera_model.h>
 #include <sensor_msgs/image_encodings.h>
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-namespace frontier_surfels::replay {
+namespace frontier_surfels::messages {
 namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
@@ -102,27 +103,40 @@ cv::Mat color_image(const ImageMessage& message) {
 }
 
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {
-  const bool rectified = info.P[0] != 0;
-  Intrinsics intrinsics;
-  intrinsics.fx = rectified ? info.P[0] : info.K[0];
-  intrinsics.fy = rectified ? info.P[5] : info.K[4];
-  intrinsics.cx = rectified ? info.P[2] : info.K[2];
-  intrinsics.cy = rectified ? info.P[6] : info.K[5];
+  sensor_msgs::CameraInfo rectified = info;
+  if (info.P[0] == 0) rectified.P = {info.K[0], 0, info.K[2], 0, 0, info.K[4], info.K[5], 0, 0, 0, 1, 0};
+  image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
+  try {
+    model.fromCameraInfo(rectified);
+  } catch (const std::exception& error) {
+    throw BadFrame("its camera_info cannot be used (" + std::string(error.what()) + ")");
+  }
+  const cv::Size size = model.reducedResolution();
+  const Intrinsics intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy}) {
     if (!std::isfinite(number)) throw BadFrame("its camera_info is not finite");
   }
   if (!(intrinsics.fx > 0) || !(intrinsics.fy > 0)) throw BadFrame("its camera_info has no focal length");
-
-  // The region of interest is given in pixels before binning; 0 means no binning, and a region of no size the whole image.
-  const int binning_x = static_cast<int>(std::max(1u, info.binning_x));
-  const int binning_y = static_cast<int>(std::max(1u, info.binning_y));
-  intrinsics.fx /= binning_x;
-  intrinsics.fy /= binning_y;
-  intrinsics.cx = (intrinsics.cx - info.roi.x_offset) / binning_x;
-  intrinsics.cy = (intrinsics.cy - info.roi.y_offset) / binning_y;
-  intrinsics.width = static_cast<int>(info.roi.width ? info.roi.width : info.width) / binning_x;
-  intrinsics.height = static_cast<int>(info.roi.height ? info.roi.height : info.height) / binning_y;
   return intrinsics;
+}
+
+Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& image_size) {
+  Intrinsics intrinsics = to_intrinsics(info);
+  const cv::Size said(intrinsics.width, intrinsics.height);
+  if (said.width > 0 && said.height > 0 && said != image_size) {
+    throw BadFrame("the image has " + std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
+                   " pixels, but its camera_info says " + std::to_string(said.width) + "x" + std::to_string(said.height));
+  }
+  intrinsics.width = image_size.width;
+  intrinsics.height = image_size.height;
+  return intrinsics;
+}
+
+Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
+  const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z);
+  const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);
+  if (!translation.allFinite() || !rotation.coeffs().allFinite() || rotation.norm() < 1e-3) throw BadFrame("its pose is not finite");
+  return Eigen::Translation3d(translation) * rotation.normalized();
 }
 
 std::string strip_slash(const std::string& name) {
@@ -130,4 +144,4 @@ std::string strip_slash(const std::string& name) {
   return start == std::string::npos ? std::string() : name.substr(start);
 }
 
-}  // namespace frontier_surfels::replay
+}  // namespace frontier_surfels::messages

@@ -6,10 +6,13 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-#include "replay/bag_messages.hpp"
 #include "ros/bag_input.hpp"
+#include "ros/conversions.hpp"
 
 namespace frontier_surfels::replay {
+
+using namespace messages;
+
 namespace {
 
 ImageMessage raw(const sensor_msgs::Image& image) { return {boost::make_shared<sensor_msgs::Image>(image), nullptr}; }

@@ -1,0 +1,166 @@
+#!/usr/bin/python3
+"""Images, cameras and colours of every kind, good and bad."""
+import time
+
+import numpy
+from frontier_surfels.msg import FrameReport
+from sensor_msgs.msg import Image
+
+from mapper_client import Mapper, MapperTest, case, run
+from synthetic_camera import Camera, compressed_depth, header_of, metres, pose, raw_image
+
+STEPS = 3
+
+
+class Inputs(MapperTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.compressed, cls.blind, cls.colored = Mapper('compressed'), Mapper('blind'), Mapper('colored')
+        cls.compressed.wait_until_connected(cls.camera.compressed, cls.camera.info, cls.camera.tf)
+        cls.blind.wait_until_connected(cls.camera.depth, cls.camera.tf)
+        cls.colored.wait_until_connected(cls.camera.color, *cls.camera.raw())
+
+    def map_of(self, make_message, mapper=None):
+        """The map of a short walk; `make_message` makes an image of millimetres."""
+        mapper = mapper or self.mapper
+        mapper.reset()
+        self.camera.new_frame()
+        for step in range(STEPS):
+            message = make_message(self.camera.camera.depth(step))
+            self.check_integrated(self.camera.send(step, message=message), mapper)
+        return mapper.surfels()
+
+    def test_every_encoding_gives_the_same_map(self):
+        expected = self.map_of(lambda depth: raw_image(depth, '16UC1', None))
+        for name, make_message in {
+                'mono16': lambda depth: raw_image(depth, 'mono16', None),
+                '32FC1': lambda depth: raw_image(metres(depth), '32FC1', None),
+                '16UC1, big endian': lambda depth: raw_image(depth, '16UC1', None, big_endian=True),
+                '32FC1, big endian': lambda depth: raw_image(metres(depth), '32FC1', None, big_endian=True),
+                '16UC1, padded rows': lambda depth: raw_image(depth, '16UC1', None, padding=6)}.items():
+            with case(name):
+                self.assert_same_but_ids(expected, self.map_of(make_message))
+        with case('compressedDepth'):
+            self.assert_same_but_ids(expected, self.map_of(lambda depth: compressed_depth(depth, None), self.compressed))
+
+    def check_bad_image(self, reason, message, mapper=None):
+        return self.check_dropped(self.camera.send(0, message=message), FrameReport.DROPPED_BAD_IMAGE, reason, mapper)
+
+    def test_images_that_are_not_depth_are_refused(self):
+        self.map_walk(2)
+        before = self.mapper.map()
+        color, depth = self.camera.camera.color(), self.camera.camera.depth(0)
+        self.check_bad_image("'rgb8'", raw_image(color, 'rgb8', None))
+        self.check_bad_image("''", raw_image(depth, '', None))
+        cut = raw_image(depth, '16UC1', None)
+        cut.data = cut.data[:1000]
+        self.check_bad_image('1000 bytes', cut)
+        narrow = raw_image(depth, '16UC1', None)
+        narrow.step = 10
+        narrow.data = narrow.data[:10 * narrow.height]
+        self.check_bad_image('step', narrow)
+        self.check_bad_image('empty', Image(encoding='16UC1'))
+        huge = Image(encoding='16UC1', width=2**31, height=2**31, step=2**31)
+        self.check_bad_image('bytes', huge)
+        after = self.mapper.map()
+        self.assertEqual(before[0], after[0])
+        self.assert_same_map(before[1], after[1])
+        self.map_walk(1, first=2)
+
+    def test_damaged_compressed_images_are_refused(self):
+        self.compressed.reset()
+        good = compressed_depth(self.camera.camera.depth(0), None)
+        for size in (0, 5, 12, 13, 300):
+            bad = compressed_depth(self.camera.camera.depth(0), None)
+            bad.data = bad.data[:size]
+            self.check_bad_image('compressed', bad, self.compressed)
+        self.assertEqual(len(self.compressed.surfels()), 0)
+        self.check_integrated(self.camera.send(0, message=good), self.compressed)
+
+    def test_images_without_measurements_change_nothing(self):
+        self.map_walk(3)
+        before = self.mapper.surfels()
+        shape = (self.camera.camera.height, self.camera.camera.width)
+        for value in (numpy.nan, numpy.inf, -numpy.inf, 0.0, -1.0, 1e30):
+            message = raw_image(numpy.full(shape, value, dtype=numpy.float32), '32FC1', None)
+            report = self.mapper.report(self.camera.send(2, message=message))
+            self.assertIn(report.result, (FrameReport.INTEGRATED, FrameReport.DROPPED_BAD_IMAGE), report.reason)
+            self.assertEqual(report.surfels, len(before), f'after an image of {value}')
+        self.check_integrated(self.camera.send(2, message=raw_image(numpy.zeros(shape, dtype=numpy.uint16), '16UC1', None)))
+        self.assert_same_but_ids(before, self.mapper.surfels())
+
+    def test_no_camera_info(self):
+        header = self.camera.send(0)
+        self.check_dropped(header, FrameReport.DROPPED_NO_CAMERA, 'camera_info.*/nobody/camera_info', self.blind)
+        self.check_integrated(header)
+
+    def test_camera_changes_its_size(self):
+        self.check_integrated(self.camera.send(0))
+        self.camera.camera = Camera(160, 120)
+        self.check_integrated(self.camera.send(1))
+        self.camera.camera = Camera(320, 240)
+        self.check_integrated(self.camera.send(2))
+
+    def test_camera_info_of_another_size(self):
+        image = raw_image(Camera(160, 120).depth(0), '16UC1', None)
+        self.check_dropped(self.camera.send(0, message=image), FrameReport.DROPPED_NO_CAMERA, '160x120.*320x240')
+        self.check_integrated(self.camera.send(1))
+
+    def test_camera_info_a_little_later_than_its_image(self):
+        self.check_integrated(self.camera.send(0))
+        self.camera.camera = small = Camera(160, 120)
+        header = header_of(self.camera.frame)
+        self.camera.send_pose(pose(1), header.stamp)
+        self.camera.depth.publish(raw_image(small.depth(1), '16UC1', header))
+        time.sleep(0.05)
+        self.camera.info.publish(small.info(header))
+        self.check_integrated(header)
+
+    def test_camera_info_that_is_none(self):
+        for name, value in (('f', 0.0), ('f', -100.0), ('f', float('nan')), ('cx', float('inf')), ('f', 1e-9)):
+            with case(f'{name} = {value}'):
+                self.camera.camera = Camera()
+                image = raw_image(self.camera.camera.depth(0), '16UC1', None)
+                setattr(self.camera.camera, name, value)
+                self.camera.info.publish(self.camera.camera.info(header_of(self.camera.frame)))
+                time.sleep(0.05)
+                report = self.mapper.report(self.camera.send(0, message=image))
+                self.assertIn(report.result, (FrameReport.DROPPED_NO_CAMERA, FrameReport.DROPPED_BAD_IMAGE), report.reason)
+        self.assertEqual(len(self.mapper.surfels()), 0)
+
+    def colored_share(self):
+        surfels = self.colored.surfels()
+        return numpy.mean(surfels['rgb'][surfels['label'] == 1] & 0xFFFFFF != 0)
+
+    def test_color(self):
+        color = self.camera.camera.color()
+        self.colored.reset()
+        for step in range(3):
+            self.check_integrated(self.camera.send(step, color=color), self.colored)
+        self.assertGreater(self.colored_share(), 0.8)
+        surfels = self.colored.surfels()
+        self.assertTrue((surfels['rgb'][surfels['label'] == 0] & 0xFFFFFF == 0).mean() > 0.5)  # the unknown has none of its own
+        self.assertFalse(self.mapper.surfels()['rgb'].any())  # one that does not want it
+
+    def test_color_a_little_later_than_depth(self):
+        color = self.camera.camera.color()
+        self.colored.reset()
+        self.check_integrated(self.camera.send(0, color=color), self.colored)
+        self.colored.reset()
+        for step in range(1, 4):
+            header = self.camera.send(step)
+            time.sleep(0.015)
+            self.camera.color.publish(raw_image(color, 'rgb8', header))
+            self.check_integrated(header, self.colored)
+        self.assertGreater(self.colored_share(), 0.8)
+
+    def test_color_of_another_size_costs_no_frame(self):
+        self.colored.reset()
+        for step in range(2):
+            self.check_integrated(self.camera.send(step, color=Camera(160, 120).color()), self.colored)
+        self.assertEqual(self.colored_share(), 0)
+
+
+if __name__ == '__main__':
+    run('test_inputs', Inputs)

@@ -1,0 +1,106 @@
+#!/usr/bin/python3
+"""The launch files: roslaunch's own check, their documentation, and the two that play a bag from end to end."""
+import glob
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+import roslaunch.rlutil
+import rospkg
+import yaml
+from frontier_surfels.msg import FrameReport
+from roslib.packages import find_node
+
+from mapper_client import Mapper, case, run
+
+FOLDER = os.path.join(rospkg.RosPack().get_path('frontier_surfels'), 'launch')
+FILES = sorted(glob.glob(os.path.join(FOLDER, '*.launch')))
+FRAMES = 10
+
+
+def program(name):
+    return find_node('frontier_surfels', name)[0]
+
+
+class LaunchFiles(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        cls.bag = os.path.join(cls.folder, 'room.bag')
+        room = os.path.join(cls.folder, 'room')
+        for command in ([program('make_synthetic'), room, '--frames', str(FRAMES), '--size', '320x240'],
+                        [program('sequence_to_bag'), room, cls.bag]):
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=60)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def check(self, path, *arguments):
+        """roslaunch's check takes arguments from the command line."""
+        saved, sys.argv = sys.argv, ['roslaunch-check', *arguments]
+        try:
+            self.assertIsNone(roslaunch.rlutil.check_roslaunch(path))
+        finally:
+            sys.argv = saved
+
+    def test_roslaunch_check(self):
+        self.assertEqual([os.path.basename(path) for path in FILES],
+                         ['mapper.launch', 'openni.launch', 'realsense.launch', 'replay.launch', 'tum.launch'])
+        for path in FILES:
+            arguments = ['bag:=' + self.bag] if os.path.basename(path) in ('replay.launch', 'tum.launch') else []
+            for more in (['rviz:=true'], ['rviz:=false', 'manager:=camera/manager']):
+                with case(f'{os.path.basename(path)} {more}'):
+                    self.check(path, *arguments, *more)
+
+    def test_every_argument_is_documented(self):
+        for path in FILES:
+            for argument in xml.etree.ElementTree.parse(path).getroot().iter('arg'):
+                if 'value' not in argument.attrib:
+                    self.assertGreater(len(argument.get('doc', '')), 10, f"{path}: {argument.get('name')}")
+
+    def parameters(self, name, *arguments):
+        result = subprocess.run(['roslaunch', '--dump-params', 'frontier_surfels', name, *arguments], capture_output=True, text=True,
+                                timeout=30, check=True)
+        return yaml.safe_load(result.stdout)
+
+    def test_defaults_are_left_to_the_node(self):
+        self.assertEqual(sorted(self.parameters('mapper.launch')), ['/mapper/' + name for name in (
+            'color_transport', 'image_transport', 'use_color', 'world_frame')])
+        paper = self.parameters('mapper.launch', 'config:=' + os.path.join(FOLDER, '..', 'config', 'paper.yaml'), 'world_frame:=odom')
+        self.assertEqual((paper['/mapper/recent_views'], paper['/mapper/world_frame']), (0, 'odom'))
+        self.assertTrue(self.parameters('realsense.launch')['/mapper/use_color'])
+        self.assertFalse(self.parameters('openni.launch', 'color:=false')['/mapper/use_color'])
+
+    def launch(self, name, *arguments):
+        return subprocess.run(['roslaunch', 'frontier_surfels', name, 'bag:=' + self.bag, 'rviz:=false', *arguments], capture_output=True,
+                              text=True, timeout=90)
+
+    def test_tum_bag(self):
+        mapper = Mapper('mapper')
+        self.addCleanup(mapper.subscriber.unregister)
+        result = self.launch('tum.launch')
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        results = [(report.result, report.reason) for report in mapper.reports]
+        self.assertEqual(len(results), FRAMES)
+        self.assertEqual({code for code, _ in results} - {FrameReport.INTEGRATED, FrameReport.DROPPED_QUEUE}, set(), results)
+        self.assertGreater(mapper.reports[-1].surfels, 1000)
+
+    def test_replay(self):
+        report = os.path.join(self.folder, 'report')
+        result = self.launch('replay.launch', 'report:=' + report, 'options:=--octomap-resolution 0 --no-exact')
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        with open(os.path.join(report, 'summary.json'), encoding='utf-8') as file:
+            summary = json.load(file)
+        self.assertEqual(summary['input']['frames'], FRAMES)
+        self.assertGreater(summary['surfels']['total'], 1000)
+        self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
+
+
+if __name__ == '__main__':
+    run('test_launch_files', LaunchFiles)

@@ -1,0 +1,110 @@
+#!/usr/bin/python3
+"""The node as a process: how it starts, what it refuses, how it ends."""
+import signal
+import subprocess
+import threading
+import time
+import unittest
+
+import rospy
+from frontier_surfels.msg import FrameReport
+from roslib.packages import find_node
+from sensor_msgs.msg import PointCloud2
+
+from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
+from synthetic_camera import Camera
+
+REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info']
+
+
+class Processes(unittest.TestCase):
+    def start(self, name, **parameters):
+        """A mapper as a process of ours."""
+        program = find_node('frontier_surfels', 'mapper_node')[0]
+        arguments = [f'__name:={name}', *REMAPPINGS, *(f'_{key}:={value}' for key, value in parameters.items())]
+        self.addCleanup(lambda: rospy.has_param(name) and rospy.delete_param(name))
+        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def check_refused(self, *sentences, **parameters):
+        process = self.start('refused', **parameters)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 1, output)
+        for sentence in sentences:
+            self.assertRegex(output, sentence)
+
+    def test_all_wrong_parameters_are_told_at_once(self):
+        self.check_refused('z_max.*number', 'decimation', 'on_time_jump.*keep or reset', 'tf_timeout', z_max='far', decimation=0,
+                           on_time_jump='never', tf_timeout=-1.0)
+
+    def test_no_such_device(self):
+        self.check_refused('no-such-platform', platform='no-such-platform')
+
+    def test_no_such_transport(self):
+        self.check_refused('carrier_pigeon.*install', image_transport='carrier_pigeon')
+
+    def test_unknown_parameters_are_warned_of(self):
+        process = self.start('warned', z_maximum=4.0, decimatoin=2)
+        Mapper('warned').wait_until_connected()
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        self.assertRegex(output, '~z_maximum')
+        self.assertRegex(output, '~decimatoin.*decimation')
+
+    def check_ends(self, process):
+        """Ctrl-C, as roslaunch does it."""
+        start = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=20)[0]
+        self.assertLess(time.monotonic() - start, 2)
+        self.assertEqual(process.returncode, 0, output)
+
+    def test_ends_in_the_middle_of_a_frame(self):
+        camera, mapper = CameraTopics(), Mapper('busy')
+        camera.camera = Camera(640, 480)
+        process = self.start('busy', decimation=2)
+        mapper.wait_until_connected(*camera.raw())
+        for step in range(4):
+            report = mapper.report(camera.send(step))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        self.assertGreater(report.total_ms, 30)  # a frame takes its time
+        camera.send(4)
+        camera.send(5)
+        time.sleep(0.02)
+        self.check_ends(process)
+
+    def test_ends_while_a_frame_waits_for_its_pose(self):
+        camera, mapper = CameraTopics(), Mapper('waiting')
+        process = self.start('waiting', tf_timeout=10.0)
+        mapper.wait_until_connected(camera.depth, camera.info)
+        camera.send(0, send_pose=False)
+        time.sleep(0.3)
+        self.check_ends(process)
+
+    def test_ends_without_a_frame(self):
+        process = self.start('idle')
+        Mapper('idle').wait_until_connected()
+        self.check_ends(process)
+
+    def test_ends_while_a_subscriber_is_stuck(self):
+        camera, mapper = CameraTopics(), Mapper('watched')
+        process = self.start('watched', publish_period=0.05)
+        mapper.wait_until_connected(*camera.raw())
+        release = threading.Event()
+        self.addCleanup(release.set)
+        stuck = []
+        subscriber = rospy.Subscriber('watched/surfels', PointCloud2, lambda message: stuck.append(1) or release.wait(60), queue_size=1)
+        self.addCleanup(subscriber.unregister)
+        for step in range(10):
+            mapper.report(camera.send(step))
+            time.sleep(0.06)
+        wait_until(lambda: stuck, what='a cloud')
+        self.check_ends(process)
+
+
+if __name__ == '__main__':
+    run('test_processes', Processes)

@@ -1,0 +1,218 @@
+/// Surfels as clouds and back: bit for bit, and nothing from what is damaged.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+#include <limits>
+
+#include "mapper_input.hpp"
+#include "ros/serialized.hpp"
+#include "ros/surfel_input.hpp"
+#include "ros/surfel_messages.hpp"
+
+namespace frontier_surfels::messages {
+namespace {
+
+using sensor_msgs::PointCloud2;
+using sensor_msgs::PointField;
+
+std::vector<Surfel> awkward_surfels() {
+  Rng rng(1);
+  std::vector<Surfel> surfels = random_surfels(rng, 3000);
+  surfels[0].position = {-0.0F, std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::max()};
+  surfels[1].normal = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 0};
+  surfels[2].rgb = {255, 255, 255};
+  surfels[3].rgb = {0, 0, 1};
+  surfels[4].id = std::numeric_limits<std::uint32_t>::max();
+  return surfels;
+}
+
+SurfelMirror mirror_of(const std::vector<Surfel>& surfels) {
+  SurfelMirror mirror;
+  mirror.apply(Changes{1, surfels, {}}, 0);
+  return mirror;
+}
+
+template <typename T>
+T read(const PointCloud2& cloud, std::size_t point, std::size_t field) {
+  T value;
+  std::memcpy(&value, &cloud.data[point * cloud.point_step + cloud.fields[field].offset], sizeof(value));
+  return value;
+}
+
+TEST(SurfelClouds, ComeBackBitForBit) {
+  const auto surfels = awkward_surfels();
+  EXPECT_TRUE(same(to_surfels(to_cloud(surfels)), surfels));
+  EXPECT_TRUE(to_surfels(to_cloud(std::vector<Surfel>())).empty());
+}
+
+TEST(SurfelClouds, HaveTheFieldsThatOthersExpect) {
+  Surfel surfel;
+  surfel.position = {1, 2, 3};
+  surfel.normal = {4, 5, 6};
+  surfel.radius = 7;
+  surfel.rgb = {0x12, 0x34, 0x56};
+  surfel.id = 8;
+  surfel.label = Label::kOccupied;
+  const PointCloud2 cloud = to_cloud({Surfel(), surfel});
+  EXPECT_EQ(cloud.height, 1U);
+  EXPECT_EQ(cloud.width, 2U);
+  EXPECT_EQ(cloud.point_step, 40U);
+  EXPECT_EQ(cloud.row_step, 80U);
+  EXPECT_EQ(cloud.data.size(), 80U);
+
+  const std::vector<std::string> names = {"x", "y", "z", "normal_x", "normal_y", "normal_z", "radius", "rgb", "id", "label"};
+  ASSERT_EQ(cloud.fields.size(), names.size());
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    EXPECT_EQ(cloud.fields[n].name, names[n]);
+    EXPECT_EQ(cloud.fields[n].count, 1U);
+    EXPECT_EQ(cloud.fields[n].datatype, n < 8 ? PointField::FLOAT32 : n == 8 ? PointField::UINT32 : PointField::UINT8);
+  }
+  for (std::size_t n = 0; n < 7; ++n) EXPECT_EQ(read<float>(cloud, 1, n), static_cast<float>(n + 1));
+  EXPECT_EQ(read<std::uint32_t>(cloud, 1, 7), 0x123456U);
+  EXPECT_EQ(read<std::uint32_t>(cloud, 0, 7), 0U);
+  EXPECT_EQ(read<std::uint32_t>(cloud, 1, 8), 8U);
+  EXPECT_EQ(read<std::uint8_t>(cloud, 1, 9), 1);
+  EXPECT_EQ(read<std::uint8_t>(cloud, 0, 9), 0);
+}
+
+TEST(SurfelClouds, OfAMapLeaveOutItsGaps) {
+  Rng rng(2);
+  SurfelMirror mirror = mirror_of(random_surfels(rng, 5000));
+  mirror.apply(random_changes(rng, 1, 6000, 2000), 1);
+  ASSERT_LT(mirror.size(), mirror.slots().size());
+  EXPECT_TRUE(same(to_surfels(to_cloud(mirror)), mirror.surfels()));
+  for (const Label label : {Label::kOccupied, Label::kFrontier})
+    EXPECT_TRUE(same(to_surfels(to_cloud(mirror, label)), mirror.surfels(label)));
+}
+
+/// The fields in another order, with gaps, and in rows with gaps.
+TEST(SurfelClouds, AreReadByTheirFieldsNames) {
+  const auto surfels = awkward_surfels();
+  const PointCloud2 plain = to_cloud(surfels);
+  PointCloud2 cloud = plain;
+  std::reverse(cloud.fields.begin(), cloud.fields.end());
+  for (std::size_t n = 0; n < cloud.fields.size(); ++n) cloud.fields[n].offset = static_cast<std::uint32_t>(3 + 5 * n);
+  cloud.fields.insert(cloud.fields.begin() + 4, PointField());
+  cloud.width = 300;
+  cloud.height = 10;
+  cloud.point_step = 57;
+  cloud.row_step = 300 * 57 + 11;
+  cloud.data.assign(10 * cloud.row_step - 11, 0xee);
+  for (std::size_t point = 0; point < surfels.size(); ++point) {
+    for (const PointField& field : plain.fields) {
+      const auto to = std::find_if(cloud.fields.begin(), cloud.fields.end(), [&](const PointField& f) { return f.name == field.name; });
+      std::memcpy(&cloud.data[point / 300 * cloud.row_step + point % 300 * 57 + to->offset], &plain.data[point * 40 + field.offset],
+                  field.datatype == PointField::UINT8 ? 1 : 4);
+    }
+  }
+  EXPECT_TRUE(same(to_surfels(cloud), surfels));
+}
+
+/// @return the sentence of the error, empty if there was none
+std::string refusal(const std::function<void(PointCloud2&)>& damage) {
+  Rng rng(3);
+  PointCloud2 cloud = to_cloud(random_surfels(rng, 10));
+  damage(cloud);
+  try {
+    to_surfels(cloud);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SurfelClouds, AreRefusedWithoutOneOfTheFields) {
+  for (std::size_t n = 0; n < 10; ++n) {
+    std::string name;
+    const std::string missing = refusal([&](PointCloud2& cloud) {
+      name = cloud.fields[n].name;
+      cloud.fields.erase(cloud.fields.begin() + static_cast<std::ptrdiff_t>(n));
+    });
+    EXPECT_NE(missing.find("no field " + name), std::string::npos) << missing;
+    const std::string retyped = refusal([&](PointCloud2& cloud) { cloud.fields[n].datatype = PointField::INT16; });
+    EXPECT_NE(retyped.find("field " + name + " is not of the type"), std::string::npos) << retyped;
+    EXPECT_NE(refusal([&](PointCloud2& cloud) { cloud.fields[n].count = 2; }), "");
+    const std::string outside = refusal([&](PointCloud2& cloud) { cloud.fields[n].offset = 40; });
+    EXPECT_NE(outside.find("outside"), std::string::npos) << outside;
+    EXPECT_NE(refusal([&](PointCloud2& cloud) { cloud.fields[n].offset = 0xfffffffe; }), "");
+  }
+}
+
+TEST(SurfelClouds, AreRefusedWhenTheDataAreDamaged) {
+  EXPECT_EQ(refusal([](PointCloud2&) {}), "");
+  const std::string cut = refusal([](PointCloud2& cloud) { cloud.data.pop_back(); });
+  EXPECT_NE(cut.find("cut short"), std::string::npos) << cut;
+  EXPECT_NE(cut.find("399 bytes instead of 400"), std::string::npos) << cut;
+  EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.data.clear(); }), "");
+  EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.width = 0xffffffff; }), "");
+  EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.height = 0xffffffff; }), "");
+  EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.width = cloud.height = cloud.point_step = cloud.row_step = 0xffffffff; }), "");
+  EXPECT_NE(refusal([](PointCloud2& cloud) {
+              cloud.height = 2;
+              cloud.row_step = 0;
+            }),
+            "");
+  const std::string order = refusal([](PointCloud2& cloud) { cloud.is_bigendian = !cloud.is_bigendian; });
+  EXPECT_NE(order.find("byte order"), std::string::npos) << order;
+  const std::string label = refusal([](PointCloud2& cloud) { cloud.data[7 * 40 + cloud.fields[9].offset] = 2; });
+  EXPECT_NE(label.find("2 is no label"), std::string::npos) << label;
+}
+
+TEST(SurfelUpdates, SayWhatHasChanged) {
+  Rng rng(4);
+  const Changes changes = random_changes(rng, 41, 1000, 300);
+  const SurfelUpdate update = to_message(changes, 41, Eigen::AlignedBox3f(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, 5, 6)));
+  EXPECT_EQ(update.since, 41U);
+  EXPECT_EQ(update.sequence, changes.sequence);
+  EXPECT_EQ(update.removed, changes.removed);
+  EXPECT_TRUE(same(to_surfels(update.surfels), changes.updated));
+  EXPECT_EQ(update.box_min.x, 1);
+  EXPECT_EQ(update.box_min.y, 2);
+  EXPECT_EQ(update.box_min.z, 3);
+  EXPECT_EQ(update.box_max.x, 4);
+  EXPECT_EQ(update.box_max.y, 5);
+  EXPECT_EQ(update.box_max.z, 6);
+
+  const SurfelUpdate none = to_message(Changes{8, {}, {}}, 7, Eigen::AlignedBox3f());
+  EXPECT_GT(none.box_min.x, none.box_max.x);
+}
+
+TEST(SerializedMessages, AreNotSerialisedAgain) {
+  Rng rng(5);
+  const PointCloud2 cloud = to_cloud(random_surfels(rng, 100));
+  const Serialized packed = serialized(cloud);
+  const ros::SerializedMessage bytes = ros::serialization::serializeMessage(packed);
+  EXPECT_EQ(bytes.buf.get(), packed.bytes.buf.get());
+  PointCloud2 back;
+  ros::serialization::deserializeMessage(bytes, back);
+  EXPECT_EQ(back.data, cloud.data);
+  EXPECT_STREQ(ros::message_traits::md5sum(packed), "*") << "it must fit every topic";
+}
+
+TEST(FrameReports, SayWhatTheMapperSays) {
+  Report report;
+  report.sequence = 1234567890123;
+  report.surfels = 1;
+  report.in_view = 2;
+  report.created = 3;
+  report.removed = 4;
+  report.split = 5;
+  report.view_kept = true;
+  report.total_ms = 6.5;
+  report.stages = {{"first", 1.5}, {"second", 2.5}};
+  const FrameReport message = to_message(report);
+  EXPECT_EQ(message.sequence, 1234567890123U);
+  EXPECT_EQ(message.surfels, 1U);
+  EXPECT_EQ(message.in_view, 2U);
+  EXPECT_EQ(message.created, 3U);
+  EXPECT_EQ(message.removed, 4U);
+  EXPECT_EQ(message.split, 5U);
+  EXPECT_TRUE(message.view_kept);
+  EXPECT_EQ(message.total_ms, 6.5);
+  EXPECT_EQ(message.stage_names, (std::vector<std::string>{"first", "second"}));
+  EXPECT_EQ(message.stage_ms, (std::vector<double>{1.5, 2.5}));
+}
+
+}  // namespace
+}  // namespace frontier_surfels::messages

@@ -1,0 +1,158 @@
+/// Candidates on sheets of unknown that are too thin, against the exact test of every candidate's back in every view.
+
+#include <gtest/gtest.h>
+
+#include "stages/reference_observed_space.hpp"
+#include "stages/reference_paths.hpp"
+#include "stages/reference_views.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+struct Scene {
+  Camera camera;
+  Nuvg grid;
+  SeenView current;
+  std::vector<SeenView> kept;
+  std::vector<float> layer_depth;
+  Field<char> observed;
+};
+
+/// Of the candidates that no view knows: how many lie on gaps that this view alone closes, or the kept ones alone; and how many would,
+/// were they not at a measured surface.
+struct Tally {
+  std::size_t by_current = 0, by_kept = 0, at_surfaces = 0;
+  void operator+=(const Tally& other) {
+    by_current += other.by_current;
+    by_kept += other.by_kept;
+    at_surfaces += other.at_surfaces;
+  }
+};
+
+/// Is a candidate left out: no measured surface, with a normal, and known again `min_gap` behind its centre?
+Truth closes(const Scene& scene, const Vector3i& v, Tally& tally) {
+  const Config& config = scene.camera.config;
+  const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z()), sum = sum_of_directions(scene.grid, scene.observed, v);
+  if (less(sum.norm(), 0.01, 1e-4) == Truth::yes) return Truth::no;
+  const Vector3d behind = center - config.min_gap * sum.normalized();
+  const Truth by_current = camera_knows(scene.current.image, behind);
+  const Truth by_kept = any_knows(scene.kept, scene.current.T_world_camera * behind);
+  const Truth surface = at_surface(scene.grid, scene.current.image, scene.layer_depth, config.surface_depth, v, center.z());
+  const Truth known = by_current || by_kept;
+  tally.by_current += (by_current && !by_kept && !surface) == Truth::yes;
+  tally.by_kept += (by_kept && !by_current && !surface) == Truth::yes;
+  tally.at_surfaces += (known && surface) == Truth::yes;
+  // Where directions nearly cancel, their sum's direction is too uncertain in float.
+  return sum.norm() < 0.1 && !(surface == Truth::yes) ? Truth::open : known && !surface;
+}
+
+struct Setup {
+  double min_gap;
+  int frames;  ///< views before the current one; with the configured number kept
+  int recent_views;
+  Content content;
+  double surface_depth;
+};
+
+/// @param observed_density  of a random C~; negative: the image's own
+Scene prepare(Camera camera, const Setup& setup, double observed_density, StagesProbe& probe, Random& random) {
+  Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
+  const Eigen::Isometry3d T_world_start = random.pose(2, 3);
+  for (int frame = 0; frame < setup.frames; ++frame) {
+    const SeenView view = {random_image(camera, setup.content, random), T_world_start * random.pose(0.5, 0.6)};
+    probe.views().set_current(view.image, view.T_world_camera);
+    EXPECT_EQ(probe.views().keep_current(), setup.recent_views > 0);
+    if (setup.recent_views > 0) scene.kept.push_back(view);
+  }
+  scene.current = {random_image(camera, setup.content, random), T_world_start};
+  probe.stages().begin_frame(scene.current.image, T_world_start, 2);
+  probe.stages().observe_space();  // where the columns end
+  if (observed_density >= 0) probe.set_observed(random_field(probe.grid(), observed_density, random));
+  scene.observed = probe.observed();
+  scene.layer_depth = probe.layer_depth();
+  return scene;
+}
+
+/// @param anywhere  candidates at random unobserved voxels; else those that section 3.5 has
+Tally check(Camera camera, const Setup& setup, double observed_density, bool anywhere) {
+  SCOPED_TRACE(camera.name + ", gaps of " + std::to_string(setup.min_gap) + " m, " + std::to_string(setup.frames) + " frames, " +
+               std::to_string(setup.recent_views) + " views kept, density " + std::to_string(observed_density));
+  camera.config.min_gap = setup.min_gap;
+  camera.config.recent_views = setup.recent_views;
+  camera.config.surface_depth = setup.surface_depth;
+  Random random(static_cast<unsigned>(setup.frames));
+  StagesProbe probe(camera.config);
+  const Scene scene = prepare(camera, setup, observed_density, probe, random);
+  Field<char> all = anywhere ? random_field(probe.grid(), 0.5, random) : candidates(scene.observed, Field<char>(probe.grid(), 0));
+  for_each_voxel(all, [&](int i, int j, int k) { all(i, j, k) = all(i, j, k) && !scene.observed(i, j, k); });
+  probe.set_candidates(all);
+
+  probe.stages().settle_by_recent_views();
+  Tally tally;
+  Field<Truth> expected = scene.grid.field(Truth::no);
+  for_each_voxel(all, [&](int i, int j, int k) {
+    if (!all(i, j, k)) return;
+    const Truth settled = any_knows(scene.kept, scene.current.T_world_camera * scene.grid.center_of(i, j, k));
+    if (settled == Truth::yes) return;
+    expected(i, j, k) = setup.min_gap > 0 ? !settled && !closes(scene, {i, j, k}, tally) : !settled;
+  });
+  expect_equal("candidates left", expected, probe.candidates());
+  return tally;
+}
+
+constexpr double kSurfaceDepth = 0.1;
+
+TEST(StageThinGaps, RandomViews) {
+  for (const double min_gap : {0.01, 0.1}) {
+    Tally tally;
+    for (const Camera& camera : cameras())
+      for (const Content content : {Content::mixed, Content::all_valid}) {
+        tally += check(camera, {min_gap, 3, 10, content, kSurfaceDepth}, 0.2, true);
+        check(camera, {min_gap, 3, 10, content, kSurfaceDepth}, 0.02, true);  // most have no normal
+      }
+    const std::size_t few = small_tests() ? 0 : 100;
+    EXPECT_GT(tally.by_current, few) << "nothing was tested";
+    EXPECT_GT(tally.by_kept, few) << "nothing was tested";
+    EXPECT_GT(tally.at_surfaces, few) << "nothing was tested";
+  }
+}
+
+/// With the frame's own C~ and the candidates around it.
+TEST(StageThinGaps, CandidatesOfTheFrame) {
+  Tally tally;
+  for (const Camera& camera : cameras())
+    for (const Content content : {Content::mixed, Content::all_valid})
+      tally += check(camera, {0.05, 3, 10, content, kSurfaceDepth}, -1, false);
+  const std::size_t few = small_tests() ? 0 : 100;
+  EXPECT_GT(tally.by_current, few) << "nothing was tested";
+  EXPECT_GT(tally.by_kept, few) << "nothing was tested";
+  EXPECT_GT(tally.at_surfaces, few) << "nothing was tested";
+}
+
+TEST(StageThinGaps, SurfacesOnlyWhereColumnsEnd) {
+  std::size_t at_surfaces = 0;
+  for (const Camera& camera : cameras()) at_surfaces += check(camera, {0.1, 3, 10, Content::all_valid, 0}, 0.2, true).at_surfaces;
+  EXPECT_GT(at_surfaces, small_tests() ? 0u : 50u) << "nothing was tested";
+}
+
+TEST(StageThinGaps, NoKeptViews) {
+  for (const int recent_views : {0, 10}) {
+    const Tally tally =
+        check(cameras().front(), {0.1, recent_views == 0 ? 2 : 0, recent_views, Content::all_valid, kSurfaceDepth}, 0.2, true);
+    EXPECT_GT(tally.by_current, 20u);
+    EXPECT_EQ(tally.by_kept, 0u);
+  }
+}
+
+TEST(StageThinGaps, NothingIsKnownBehindEmptyViews) {
+  const Tally tally = check(cameras().front(), {0.1, 3, 10, Content::all_invalid, kSurfaceDepth}, 0.2, true);
+  EXPECT_EQ(tally.by_current + tally.by_kept, 0u);
+}
+
+TEST(StageThinGaps, AllIsKeptIfSoConfigured) { check(cameras().front(), {0, 3, 10, Content::all_valid, kSurfaceDepth}, 0.2, true); }
+
+}  // namespace
+}  // namespace frontier_surfels
