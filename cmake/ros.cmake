@@ -13,6 +13,11 @@ if(FRONTIER_SURFELS_ROS)
   file(WRITE ${guard} "")
   install(CODE "include(\"${guard}\")")
 
+  # catkin notes the environment of its tests as soon as it is found, and leaves out folders that are not there yet.
+  if(CMAKE_SOURCE_DIR STREQUAL PROJECT_SOURCE_DIR)
+    file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/devel/lib/python3/dist-packages)
+  endif()
+
   find_package(catkin QUIET)
   if(catkin_FOUND)
     set(FRONTIER_SURFELS_WITH_ROS ON)
