@@ -1,4 +1,4 @@
-/// kernels/9_candidates.cl, exactly, against eq. (13) one voxel at a time.
+/// kernels/5_candidates.cl, exactly, against eq. (13) one voxel at a time.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/4_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
+/// kernels/7_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/6_sweeps.cl, exactly, against Algorithm 1 walked one path at a time on random events.
+/// kernels/9_sweeps.cl, exactly, against Algorithm 1 walked one path at a time on random events.
 
 #include <gtest/gtest.h>
 
