@@ -82,7 +82,7 @@ class Usage(unittest.TestCase):
     def test_what_cannot_be_done_is_one_sentence(self):
         for sentence, arguments in [('no-such-recording', ['no-such-recording', '--report', self.report]),
                                     ('report.*--report', [self.folder.name, '--report', '/proc/no-such-folder']),
-                                    ('a folder, and --live plays bags: make one with sequence_to_bag|built without ROS', [self.folder.name, '--report', self.report, '--live']),
+                                    ('a folder, and --live plays bags: make one with sequence_to_bag|--live needs ROS', [self.folder.name, '--report', self.report, '--live']),
                                     ('no-such.yaml', [self.folder.name, '--report', self.report, '--config', 'no-such.yaml'])]:
             with self.subTest(arguments=arguments):
                 self.check_refused(FAILED, sentence, arguments=arguments)
