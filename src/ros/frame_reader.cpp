@@ -9,7 +9,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(1);
-constexpr auto kColorWait = std::chrono::milliseconds(50);  // colour is an extra: a frame waits a camera's period for it, no more
+constexpr auto kColorWait = std::chrono::milliseconds(30);  // colour is an extra: a frame waits a camera's period for it, no more
 
 /// Runs a conversion; what it throws becomes the reason to drop the frame.
 template <typename Work>

@@ -5,6 +5,7 @@
 #include <ros/this_node.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 #include <visualization_msgs/MarkerArray.h>
 
@@ -20,9 +21,17 @@ namespace {
 constexpr std::size_t kMostWaiting = 4;                                           // pushes; then no more are wanted
 constexpr std::uint32_t kUpdatesQueue = 50, kMarkersQueue = 20, kCloudQueue = 1;  // messages, for a slow subscriber
 constexpr int kNiceness = 10;                                                     // the mapping itself comes first
+constexpr double kShare = 0.1;   // of a core, for publishing at most: who sends and who receives a large map take as much again
 
 /// Of a single thread, as Linux has it. A refusal does no harm.
 void set_niceness(int thread_id, int niceness) { setpriority(PRIO_PROCESS, static_cast<id_t>(thread_id), niceness); }
+
+/// Of the calling thread [s].
+double cpu_time() {
+  timespec time = {};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
 
 /// Whether a subscriber lives in this process, as another nodelet does.
 bool is_within(const ros::SingleSubscriberPublisher& link) { return link.getSubscriberName() == ros::this_node::getName(); }
@@ -235,6 +244,7 @@ void MapPublisher::publish_what_is_due() {
   if (!is_heard(kMarkers)) markers_.forget();
   if (map_.sequence() == 0) return;
   const bool due = Clock::now() >= next_time_.load();
+  const double cpu_before = cpu_time();
   bool published = false;
   for (const Topic topic : {kSurfels, kOccupied, kFrontier, kMarkers}) {
     if (stopping_) return;
@@ -245,8 +255,10 @@ void MapPublisher::publish_what_is_due() {
     }
     at_once_[topic] = false;
   }
-  // Counted from the end, so that a slow machine has time for other things; who has just come does not delay the others.
-  if (due && published) next_time_ = Clock::now() + period_;
+  // Counted from the end, so that a slow machine has time for other things, and the longer the larger the map is; who has just come does
+  // not delay the others.
+  const std::chrono::duration<double> rest((cpu_time() - cpu_before) / kShare);
+  if (due && published) next_time_ = Clock::now() + std::max(period_, std::chrono::duration_cast<Clock::duration>(rest));
 }
 
 /// Publishes what `make` returns; a message that cannot be made is left out.
