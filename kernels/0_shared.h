@@ -23,6 +23,12 @@ namespace frontier_surfels {
 // Elements that one work item adds up in a prefix sum.
 #define SCAN_CHUNK 64
 
+// Surfels of a page of the map: a bit each in the words that say something of a page.
+#define PAGE_SLOTS 64
+
+// Work items that sort new surfels by block, one after the other each its share.
+#define SORT_CHUNKS 64
+
 // Bit fields of the sign field's events: EVENT_PLANES for each family of paths (i, j, k), in this order.
 #define EVENT_ENTER_FORWARD 0
 #define EVENT_EXIT_FORWARD 1
@@ -40,10 +46,9 @@ namespace frontier_surfels {
 #define FACE_K_HIGH 5
 
 // A surfel's attributes beside its geometry: red | green << 8 | blue << 16 | flags << 24.
-#define SURFEL_ALIVE (1u << 24)
-#define SURFEL_OCCUPIED (1u << 25)
-#define SURFEL_COLORED (1u << 26)
-#define SURFEL_RAGGED (1u << 27)  // known space is thin here: the normal finds it, but says nothing of the paths around
+#define SURFEL_OCCUPIED (1u << 24)
+#define SURFEL_COLORED (1u << 25)
+#define SURFEL_RAGGED (1u << 26)  // known space is thin here: the normal finds it, but says nothing of the paths around
 
 // The non-uniform voxel grid of one view - paper 3.1, eq. (2)-(3).
 typedef struct {
@@ -63,6 +68,14 @@ typedef struct {
   float r00, r01, r02, r10, r11, r12, r20, r21, r22;
   float t0, t1, t2;
 } Transform;
+
+// The map's blocks around this frame's grid. The local frame is the world's, moved to the corner of the first block: its numbers stay small
+// wherever the camera is. Block (x, y, z) from the corner is cell (z size_y + y) size_x + x.
+typedef struct {
+  SHARED_INT origin_x, origin_y, origin_z;  // first block, counted from the world's origin
+  SHARED_INT size_x, size_y, size_z;        // blocks
+  float block_size;                         // edge of a block, a power of two [m]
+} Window;
 
 // A kept view: where it was and where its depths start in the pool.
 typedef struct {
@@ -101,6 +114,7 @@ typedef struct {
 #ifndef __OPENCL_VERSION__
 static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
 static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
+static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 20 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 10 * 4, "Limits must have no padding");

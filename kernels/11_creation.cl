@@ -62,13 +62,11 @@ float3 slide_to_boundary(const Grid* g, const View* view, __global const View* v
 // One work item a new surfel.
 //   in  voxels[count]: 64 word + bit of each candidate;  refine: whether they leave their voxel's centre and mean normal
 //       view: this frame's, views[view_count]: the kept ones, both in this frame's camera;  depths: their images
-//   i/o the map;  in_view_slots: the new surfels' slots behind the `in_view` ones already there
-__kernel void create_surfels(const Grid g, const Limits limits, const Transform T_world_camera, const int refine, const View view,
-                             __global const View* views, const int view_count, __global const float* depths,
+//   out new_surfels, new_cells: for the map
+__kernel void create_surfels(const Grid g, const Limits limits, const Window window, const Transform T_local_camera, const int refine,
+                             const View view, __global const View* views, const int view_count, __global const float* depths,
                              __global const float* layer_depth, __global const ulong* observed, __global const uint* voxels,
-                             const uint count, __global float4* position_radius, __global float4* normal_attributes, __global uint* changed,
-                             const uint frame, __global const uint* free_slots, const uint free_count, const uint slots,
-                             __global uint* in_view_slots, const uint in_view) {
+                             const uint count, __global uint4* new_surfels, __global uint* new_cells) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
@@ -77,10 +75,9 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Transform 
   bool ragged = false;
   const float3 normal = refine ? surfel_normal(&g, &view, depths, layer_depth, observed, v, &ragged)
                                : normalize(observed_direction(&g, layer_depth, observed, v));
-  const uint slot = new_slot(n, free_slots, free_count, slots);
   const float3 placed = refine ? slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal) : p;
-  position_radius[slot] = (float4)(transform_point(&T_world_camera, placed), limits.create_radius * voxel_size(&g, p.z));
-  normal_attributes[slot] = (float4)(normalize(rotate(&T_world_camera, normal)), as_float(SURFEL_ALIVE | (ragged ? SURFEL_RAGGED : 0)));
-  changed[slot] = frame;
-  in_view_slots[in_view + n] = slot;
+  uint cell;
+  new_surfels[n] = pack_surfel(&window, transform_point(&T_local_camera, placed), limits.create_radius * voxel_size(&g, p.z),
+                               rotate(&T_local_camera, normal), ragged ? SURFEL_RAGGED : 0, &cell);
+  new_cells[n] = cell;
 }

@@ -50,23 +50,3 @@ __kernel void list_bits(__global const ulong* words, const uint count, __global 
   uint at = offsets[n];
   for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
 }
-
-// What a frame has changed. One work item a surfel in view: marks its slot if it has; a slot that was freed and taken again is there twice.
-//   i/o changed_slots: bit field over the map's slots as 32-bit halves, zero before
-__kernel void mark_changed(__global const uint* in_view_slots, const uint count, __global const uint* changed, const uint frame,
-                           __global uint* changed_slots) {
-  const uint n = get_global_id(0);
-  if (n >= count) return;
-  const uint slot = in_view_slots[n];
-  if (changed[slot] == frame) atomic_or(&changed_slots[slot / 32], 1u << slot % 32);
-}
-
-// One work item a slot of a list: its surfel, for the host.
-__kernel void gather_surfels(__global const uint* slots, const uint count, __global const float4* position_radius,
-                             __global const float4* normal_attributes, __global float4* gathered_positions,
-                             __global float4* gathered_normals) {
-  const uint n = get_global_id(0);
-  if (n >= count) return;
-  gathered_positions[n] = position_radius[slots[n]];
-  gathered_normals[n] = normal_attributes[slots[n]];
-}

@@ -63,14 +63,17 @@ INLINE uint face_key(float position, int size, float entering, float th_d, bool 
   return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
 }
 
-// One work item a slot: surfels beyond a face, and within its range in the other two coordinates (with their own reach as a margin), enter
-// it.
+// One work item a slot of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own reach
+// as a margin), enter it.
 //   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
-__kernel void project_hull(const Grid g, const Limits limits, const Transform T_camera_world, __global const float4* position_radius,
-                           __global const float4* normal_attributes, const uint slots, __global const uint* lines, __global uint* faces) {
-  const uint slot = get_global_id(0);
-  if (slot >= slots || !is_alive(normal_attributes[slot])) return;
-  const ViewSurfel s = place_in_view(&g, &T_camera_world, position_radius[slot], normal_attributes[slot], slot);
+__kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
+                           __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
+                           __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
+  const uint item = get_global_id(0);
+  if (item >= PAGE_SLOTS * count) return;
+  const uint slot = PAGE_SLOTS * pages[item / PAGE_SLOTS] + item % PAGE_SLOTS;
+  if (!is_alive(alive, slot)) return;
+  const ViewSurfel s = place_slot(&g, &window, &T_camera_local, surfels, page_block, slot);
   const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d, s.ragged != 0),
              key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d, s.ragged != 0);
   const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d, s.ragged != 0);

@@ -40,12 +40,14 @@ struct Mapper::Impl {
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
         commands(choose_device(config)),
-        map(commands),
+        lists(commands),
+        map(commands, lists, config),
         views(commands, config),
-        stages(commands, config, map, views) {}
+        stages(commands, lists, config, map, views) {}
 
   Config config;
   Commands commands;
+  Lists lists;
   SurfelMap map;
   RecentViews views;
   Stages stages;
@@ -105,6 +107,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
 
   // Labels and colour - 3.5
   stages.label_surfels();
+  stages.finish_frame();
 
   report.view_kept = views.keep_current();
   report.stages = commands.take_times();
@@ -130,15 +133,16 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 Changes Mapper::changes(std::uint64_t since) const {
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
   const bool last_frame = impl_->frame_on_device == impl_->sequence && since + 1 == impl_->sequence;
-  Changes changes = on_device([&] { return last_frame ? impl_->stages.changes() : impl_->map.changes(since); });
+  Changes changes = on_device([&] { return last_frame ? impl_->map.last_changes() : impl_->map.changes(since); });
   changes.sequence = impl_->sequence;
   return changes;
 }
 
 void Mapper::save(const std::string& path) const { write_ply(path, surfels()); }
 
-void Mapper::load(const std::string& path) {
-  const std::vector<Surfel> surfels = read_ply(path);
+void Mapper::load(const std::string& path) { load(read_ply(path)); }
+
+void Mapper::load(const std::vector<Surfel>& surfels) {
   on_device([&] { impl_->map.replace(surfels, static_cast<std::uint32_t>(impl_->sequence + 1)); });
   impl_->views.clear(impl_->map.size() == 0);
   ++impl_->sequence;

@@ -6,8 +6,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kGroup = 64;      // work items of a group, where kernels do not say otherwise
-constexpr std::size_t kScanFew = 2048;  // so many values one work item scans alone
+constexpr std::size_t kGroup = 64;  // work items of a group, where kernels do not say otherwise
+constexpr double kHullReach = 2;    // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
   Limits limits = {};
@@ -30,8 +30,9 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b) {
 
 }  // namespace
 
-Stages::Stages(Commands& commands, const Config& config, SurfelMap& map, RecentViews& views)
+Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap& map, RecentViews& views)
     : commands_(commands),
+      lists_(lists),
       map_(map),
       views_(views),
       config_(config),
@@ -53,28 +54,28 @@ Stages::Stages(Commands& commands, const Config& config, SurfelMap& map, RecentV
       hull_faces_(commands),
       lines_(commands),
       in_view_bits_(commands),
+      large_bits_(commands),
       removed_bits_(commands),
       in_view_slots_(commands),
+      split_list_(commands),
       split_offsets_(commands),
       removed_list_(commands),
       created_voxels_(commands),
       view_surfels_(commands),
-      changed_bits_(commands),
-      changed_slots_(commands),
-      changed_positions_(commands),
-      changed_normals_(commands),
+      new_surfels_(commands),
+      new_cells_(commands),
+      near_pages_(commands),
       tile_begin_(commands),
       tile_cursor_(commands),
-      tile_surfels_(commands),
-      counts_(commands),
-      scan_levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
-                   DeviceArray<cl_uint>(commands)} {}
+      tile_surfels_(commands) {}
 
 void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame) {
   if (!same_camera(intrinsics_, image.intrinsics)) set_grid(image);
   frame_ = frame;
-  T_world_camera_ = to_transform(T_world_camera);
-  T_camera_world_ = to_transform(T_world_camera.inverse());
+  map_.open_window(grid_, T_world_camera);
+  window_ = map_.window().window();
+  T_camera_local_ = to_transform(map_.window().T_camera_local());
+  T_local_camera_ = to_transform(map_.window().T_camera_local().inverse());
   depth_.write(image.depth);
   valid_above_.write(image.valid_above);
   has_color_ = !image.color.empty();
@@ -124,38 +125,42 @@ void Stages::observe_space() {
 
 std::size_t Stages::select_in_view() {
   const char* stage = "in_view";
-  const std::size_t slots = map_.slots(), count = (slots + 63) / 64;
-  in_view_bits_.resize(count + 1);
-  commands_.run(stage, "mark_in_view", slots, 64, grid_, limits_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
-                static_cast<cl_uint>(slots), in_view_bits_());
-  in_view_ = list_bits(stage, in_view_bits_, count, in_view_slots_);
+  const std::size_t pages = map_.window_pages();
+  in_view_bits_.resize(pages + 1);
+  commands_.run(stage, "mark_in_view", PAGE_SLOTS * pages, PAGE_SLOTS, grid_, limits_, window_, T_camera_local_, map_.window_pages_list(),
+                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_());
+  in_view_ = lists_.list_bits(stage, in_view_bits_, pages, in_view_slots_);
+  commands_.run(stage, "to_slots", in_view_, kGroup, map_.window_pages_list(), in_view_slots_(), static_cast<cl_uint>(in_view_));
   return in_view_;
 }
 
 std::size_t Stages::split_surfels() {
   const char* stage = "split";
-  const auto count = static_cast<cl_uint>(in_view_);
-  place_surfels();
-  split_offsets_.resize(in_view_ + 1);
-  commands_.run(stage, "count_splits", in_view_, kGroup, grid_, limits_, view_surfels_(), count, split_offsets_());
-  const std::uint32_t additional = scan(stage, split_offsets_, in_view_);
-  if (additional > 0) {
-    map_.reserve(additional);
-    in_view_slots_.grow(in_view_ + additional, in_view_);
-    commands_.run(stage, "split", in_view_, kGroup, grid_, limits_, view_surfels_(), map_.position_radius(), map_.normal_attributes(),
-                  map_.changed(), frame_, in_view_slots_(), count, split_offsets_(), map_.free_list(),
-                  static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()));
-    map_.added(additional);
-    in_view_ += additional;
-    place_surfels();
-  }
-  return additional;
+  const std::size_t before = in_view_;
+  place_surfels(0);
+  const std::uint32_t parents = lists_.list_bits(stage, large_bits_, (in_view_ + 63) / 64, split_list_);
+  if (parents == 0) return 0;
+  split_offsets_.resize(parents + 1);
+  commands_.run(stage, "count_children", parents, kGroup, grid_, limits_, view_surfels_(), split_list_(), parents, split_offsets_());
+  const std::uint32_t children = lists_.scan(stage, split_offsets_, parents);
+  map_.reserve(children);
+  new_surfels_.resize(children);
+  new_cells_.resize(children);
+  commands_.run(stage, "split", parents, kGroup, grid_, limits_, window_, map_.page_block(), map_.surfels(), view_surfels_(), split_list_(),
+                parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
+  map_.removed(parents);
+  map_.insert(stage, new_surfels_, new_cells_, children, in_view_slots_, in_view_);
+  in_view_ += children;
+  place_surfels(before);
+  return children - parents;
 }
 
-void Stages::place_surfels() {
-  view_surfels_.resize(std::max<std::size_t>(in_view_, 1));  // the sign field is computed without surfels, too
-  commands_.run("split", "place_surfels", in_view_, kGroup, grid_, T_camera_world_, map_.position_radius(), map_.normal_attributes(),
-                in_view_slots_(), static_cast<cl_uint>(in_view_), view_surfels_());
+/// Surfels in view, beginning with number `first`.
+void Stages::place_surfels(std::size_t first) {
+  view_surfels_.grow(std::max<std::size_t>(in_view_, 1), first);  // the sign field is computed without surfels, too
+  large_bits_.resize((in_view_ - first) / 64 + 1);
+  commands_.run("split", "place_surfels", in_view_ - first, 64, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
+                in_view_slots_(), static_cast<cl_uint>(first), static_cast<cl_uint>(in_view_), view_surfels_(), large_bits_());
 }
 
 void Stages::assume_unknown() { filtered_.fill("median", 0, words()); }
@@ -169,7 +174,7 @@ void Stages::compute_sign_field() {
   tile_cursor_.resize(tiles + 1);
   tile_begin_.fill(stage, 0, tiles + 1);
   commands_.run(stage, "count_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_begin_());
-  tile_surfels_.resize(std::max<std::size_t>(scan(stage, tile_begin_, tiles), 1));
+  tile_surfels_.resize(std::max<std::size_t>(lists_.scan(stage, tile_begin_, tiles), 1));
   commands_.queue().enqueueCopyBuffer(tile_begin_(), tile_cursor_(), 0, 0, (tiles + 1) * sizeof(cl_uint));
   commands_.run(stage, "fill_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_cursor_(), tile_surfels_());
   const std::size_t group = commands_.device().is_cpu ? 1 : 64;
@@ -181,8 +186,9 @@ void Stages::compute_known_hull() {
   const char* stage = "known_hull";
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
   hull_faces_.fill(stage, 0xffffffffU, 2 * (j * k + i * k + i * j));
-  commands_.run(stage, "project_hull", map_.slots(), kGroup, grid_, limits_, T_camera_world_, map_.position_radius(),
-                map_.normal_attributes(), static_cast<cl_uint>(map_.slots()), lines_(), hull_faces_());
+  const std::size_t pages = map_.list_pages_near(kHullReach * config_.z_max, near_pages_);
+  commands_.run(stage, "project_hull", PAGE_SLOTS * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
+                static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), lines_(), hull_faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), grid_, hull_faces_(),
                 hull_());
@@ -202,9 +208,9 @@ void Stages::mark_removed() {
   const char* stage = "removal";
   occupied_voxels_.fill(stage, 0, words());
   removed_bits_.resize((in_view_ + 63) / 64 + 1);
-  commands_.run(stage, "mark_removed", in_view_, 64, grid_, limits_, view_, static_cast<cl_int>(config_.remove_buried), views_.depths(),
-                view_surfels_(), static_cast<cl_uint>(in_view_), map_.position_radius(), map_.normal_attributes(), observed_(),
-                occupied_voxels_(), removed_bits_());
+  commands_.run(stage, "mark_removed", in_view_, 64, grid_, limits_, window_, T_camera_local_, own_view(),
+                static_cast<cl_int>(config_.remove_buried), views_.depths(), view_surfels_(), static_cast<cl_uint>(in_view_),
+                map_.page_block(), map_.surfels(), observed_(), occupied_voxels_(), removed_bits_());
 }
 
 void Stages::find_candidates() {
@@ -230,73 +236,35 @@ void Stages::filter_candidates() {
 }
 
 std::size_t Stages::remove_surfels() {
-  created_count_ = list_bits("creation", candidates_, words(), created_voxels_);
-  removed_count_ = list_bits("removal", removed_bits_, (in_view_ + 63) / 64, removed_list_);
+  created_count_ = lists_.list_bits("creation", candidates_, words(), created_voxels_);
+  removed_count_ = lists_.list_bits("removal", removed_bits_, (in_view_ + 63) / 64, removed_list_);
   map_.reserve(created_count_);
   in_view_slots_.grow(in_view_ + created_count_, in_view_);
+  new_surfels_.resize(created_count_);
+  new_cells_.resize(created_count_);
   commands_.run("removal", "remove_surfels", removed_count_, kGroup, removed_list_(), static_cast<cl_uint>(removed_count_), view_surfels_(),
-                map_.normal_attributes(), map_.changed(), frame_, map_.free_list(), static_cast<cl_uint>(map_.free_slots()));
+                map_.alive(), map_.changed());
   map_.removed(removed_count_);
   return removed_count_;
 }
 
 std::size_t Stages::create_surfels() {
-  commands_.run(
-      "creation", "create_surfels", created_count_, kGroup, grid_, limits_, T_world_camera_, static_cast<cl_int>(config_.refine_surfels),
-      own_view(), views_.views(), static_cast<cl_int>(views_.count()), views_.depths(), layer_depth_(), observed_(), created_voxels_(),
-      static_cast<cl_uint>(created_count_), map_.position_radius(), map_.normal_attributes(), map_.changed(), frame_, map_.free_list(),
-      static_cast<cl_uint>(map_.free_slots()), static_cast<cl_uint>(map_.slots()), in_view_slots_(), static_cast<cl_uint>(in_view_));
-  map_.added(created_count_);
+  const char* stage = "creation";
+  commands_.run(stage, "create_surfels", created_count_, kGroup, grid_, limits_, window_, T_local_camera_,
+                static_cast<cl_int>(config_.refine_surfels), own_view(), views_.views(), static_cast<cl_int>(views_.count()),
+                views_.depths(), layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), new_surfels_(),
+                new_cells_());
+  map_.insert(stage, new_surfels_, new_cells_, created_count_, in_view_slots_, in_view_);
   in_view_ += created_count_;
   return created_count_;
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, limits_, T_camera_world_, depth_(), column_end_(), color_(),
-                static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.position_radius(),
-                map_.normal_attributes(), map_.changed(), frame_);
+  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, limits_, window_, T_camera_local_, depth_(), column_end_(), color_(),
+                static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.alive(), map_.page_block(),
+                map_.surfels(), map_.changed());
 }
 
-Changes Stages::changes() {
-  const char* stage = "changes";
-  const std::size_t words = (map_.slots() + 63) / 64;
-  changed_bits_.resize(words + 1);
-  changed_bits_.fill(stage, 0, words + 1);
-  commands_.run(stage, "mark_changed", in_view_, kGroup, in_view_slots_(), static_cast<cl_uint>(in_view_), map_.changed(), frame_,
-                changed_bits_());
-  const std::uint32_t count = list_bits(stage, changed_bits_, words, changed_slots_);
-  changed_positions_.resize(count);
-  changed_normals_.resize(count);
-  commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, map_.position_radius(), map_.normal_attributes(),
-                changed_positions_(), changed_normals_());
-  return to_changes(changed_slots_.read(count), changed_positions_.read(count), changed_normals_.read(count));
-}
-
-std::uint32_t Stages::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
-  if (count == 0) return 0;
-  const auto n = static_cast<cl_uint>(count);
-  if (count <= kScanFew) {
-    commands_.run(stage, "scan_few", 1, 1, values(), n);
-  } else {
-    DeviceArray<cl_uint>& sums = scan_levels_[level];
-    const std::size_t chunks = (count + SCAN_CHUNK - 1) / SCAN_CHUNK;
-    sums.resize(chunks + 1);
-    commands_.run(stage, "sum_chunks", chunks, kGroup, values(), n, sums());
-    scan(stage, sums, chunks, level + 1);
-    commands_.run(stage, "scan_chunks", chunks, kGroup, values(), n, sums());
-  }
-  return level == 0 ? values.read_one(count) : 0;
-}
-
-std::uint32_t Stages::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
-  if (count == 0) return 0;
-  const auto n = static_cast<cl_uint>(count);
-  counts_.resize(count + 1);
-  commands_.run(stage, "count_bits", count, kGroup, bits(), n, counts_());
-  const std::uint32_t total = scan(stage, counts_, count);
-  list.resize(total);
-  if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), n, counts_(), list());
-  return total;
-}
+void Stages::finish_frame() { map_.finish_frame("labels", frame_); }
 
 }  // namespace frontier_surfels

@@ -6,6 +6,7 @@
 
 #include "0_shared.h"
 #include "frontier_surfels/config.hpp"
+#include "lists.hpp"
 #include "opencl/commands.hpp"
 #include "recent_views.hpp"
 #include "surfel_map.hpp"
@@ -16,7 +17,7 @@ namespace frontier_surfels {
 
 class Stages {
  public:
-  Stages(Commands& commands, const Config& config, SurfelMap& map, RecentViews& views);
+  Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap& map, RecentViews& views);
 
   /// Sends a frame's image and, where the camera has changed, its grid. @param frame  number that changed surfels get
   void begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
@@ -38,8 +39,7 @@ class Stages {
   std::size_t create_surfels();  ///< @return how many
   void label_surfels();
 
-  /// What the frame has changed, by slot. Only once it is labelled, and before anything else happens to the map.
-  Changes changes();
+  void finish_frame();  ///< notes what has changed in the map
 
  private:
   friend class StagesProbe;  // tests read and write the fields between stages
@@ -49,14 +49,13 @@ class Stages {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
-  void place_surfels();
+  void place_surfels(std::size_t first);
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   View own_view() const;  ///< this frame's, as the camera itself sees it
-  std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level = 0);
-  std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
 
   Commands& commands_;
+  Lists& lists_;
   SurfelMap& map_;
   RecentViews& views_;
   Config config_;
@@ -65,7 +64,8 @@ class Stages {
   // This frame
   Intrinsics intrinsics_ = {};  // of the working image that the grid is for
   Grid grid_ = {};
-  Transform T_camera_world_ = {}, T_world_camera_ = {};
+  Transform T_camera_local_ = {}, T_local_camera_ = {};
+  Window window_ = {};
   View view_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
@@ -82,17 +82,12 @@ class Stages {
   DeviceArray<cl_uint> hull_faces_, lines_;
 
   // Surfels in view
-  DeviceArray<cl_ulong> in_view_bits_, removed_bits_;
-  DeviceArray<cl_uint> in_view_slots_, split_offsets_, removed_list_, created_voxels_;
+  DeviceArray<cl_ulong> in_view_bits_, large_bits_, removed_bits_;
+  DeviceArray<cl_uint> in_view_slots_, split_list_, split_offsets_, removed_list_, created_voxels_;
   DeviceArray<ViewSurfel> view_surfels_;
-  DeviceArray<cl_ulong> changed_bits_;
-  DeviceArray<cl_uint> changed_slots_;
-  DeviceArray<cl_float4> changed_positions_, changed_normals_;
+  DeviceArray<cl_uint4> new_surfels_;
+  DeviceArray<cl_uint> new_cells_, near_pages_;
   DeviceArray<cl_uint> tile_begin_, tile_cursor_, tile_surfels_;
-
-  // Prefix sums
-  DeviceArray<cl_uint> counts_;
-  DeviceArray<cl_uint> scan_levels_[4];
 };
 
 }  // namespace frontier_surfels

@@ -1,113 +1,284 @@
 #include "surfel_map.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <cmath>
+#include <numeric>
 
 #include "0_shared.h"
+#include "surfel_packing.hpp"
 
 namespace frontier_surfels {
 namespace {
 
-std::uint32_t attributes_of(const cl_float4& normal_attributes) {
-  std::uint32_t attributes;
-  std::memcpy(&attributes, &normal_attributes.s[3], sizeof(attributes));
-  return attributes;
-}
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
+constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
+constexpr std::size_t kSpare = 8;           // one page of so many is allocated ahead
 
-Surfel to_surfel(const cl_float4& p, const cl_float4& n, std::size_t slot) {
-  const std::uint32_t attributes = attributes_of(n);
-  Surfel surfel;
-  surfel.position = {p.s[0], p.s[1], p.s[2]};
-  surfel.radius = p.s[3];
-  surfel.normal = {n.s[0], n.s[1], n.s[2]};
-  surfel.label = attributes & SURFEL_OCCUPIED ? Label::kOccupied : Label::kFrontier;
-  for (int channel = 0; channel < 3; ++channel) surfel.rgb[channel] = static_cast<std::uint8_t>(attributes >> (8 * channel));
-  surfel.id = static_cast<std::uint32_t>(slot);
-  return surfel;
-}
+BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
-cl_float4 pack_normal(const Surfel& surfel) {
-  std::uint32_t attributes = SURFEL_ALIVE;
-  if (surfel.label == Label::kOccupied) attributes |= SURFEL_OCCUPIED;
-  for (int channel = 0; channel < 3; ++channel) attributes |= static_cast<std::uint32_t>(surfel.rgb[channel]) << (8 * channel);
-  if (attributes & 0xffffffu) attributes |= SURFEL_COLORED;
-  cl_float4 packed = {{surfel.normal.x(), surfel.normal.y(), surfel.normal.z(), 0}};
-  std::memcpy(&packed.s[3], &attributes, sizeof(attributes));
-  return packed;
-}
-
-void add_to(Changes& changes, std::uint32_t slot, const cl_float4& position, const cl_float4& normal) {
-  if (attributes_of(normal) & SURFEL_ALIVE)
-    changes.updated.push_back(to_surfel(position, normal, slot));
-  else
-    changes.removed.push_back(slot);
+template <typename Visitor>
+void for_each_bit(std::uint64_t bits, Visitor visitor) {
+  for (; bits != 0; bits &= bits - 1) visitor(static_cast<std::uint32_t>(__builtin_ctzll(bits)));
 }
 
 }  // namespace
 
-Changes to_changes(const std::vector<cl_uint>& slots, const std::vector<cl_float4>& positions, const std::vector<cl_float4>& normals) {
-  Changes changes;
-  for (std::size_t n = 0; n < slots.size(); ++n) add_to(changes, slots[n], positions[n], normals[n]);
-  return changes;
+SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
+    : commands_(commands),
+      lists_(lists),
+      block_size_(block_size_for(config.z_max)),
+      largest_radius_(0),
+      thickness_(config.thickness),
+      surfels_(commands),
+      alive_(commands),
+      changed_(commands),
+      page_block_(commands),
+      pages_list_(commands),
+      page_cells_list_(commands),
+      cell_pages_list_(commands),
+      histogram_(commands),
+      cell_begin_(commands),
+      free_before_(commands),
+      missing_(commands),
+      order_(commands),
+      new_pages_(commands),
+      new_blocks_(commands),
+      changes_(commands),
+      empty_(commands),
+      changed_slots_(commands),
+      gathered_(commands),
+      gathered_blocks_(commands) {
+  grow(1024);
 }
 
-SurfelMap::SurfelMap(Commands& commands)
-    : position_radius_(commands), normal_attributes_(commands), changed_(commands), free_list_(commands) {
-  reserve(1 << 16);
+void SurfelMap::grow(std::size_t pages) {
+  const std::size_t kept = index_.end();
+  surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, kSpare);
+  alive_.grow(pages, kept, kSpare);
+  changed_.grow(pages, kept, kSpare);
+  page_block_.grow(pages, kept, kSpare);
+}
+
+void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
+  const double coarsest = 1.2 * grid.z_max / grid.f;  // voxel at the far end [m], and some more
+  largest_radius_ = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
+  const double slope =
+      std::max({grid.center_i, grid.size_i - grid.center_i}) / grid.fx + std::max({grid.center_j, grid.size_j - grid.center_j}) / grid.fy;
+  const double reach = std::max(2 * largest_radius_, thickness_ * coarsest) + 2 * coarsest;
+  window_ = MapWindow(grid, T_world_camera, block_size_, reach * (1 + slope));
+  list_window();
+  commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
+}
+
+/// The window's pages by cell. Pages that insert() adds are at the end of their cell's.
+void SurfelMap::list_window() {
+  window_pages_.clear();
+  page_cells_.clear();
+  cell_pages_.assign(1, 0);
+  for (int cell = 0; cell < window_.cells(); ++cell) {
+    const BlockKey block = window_.block(cell);
+    const BlockIndex::Pages* pages = index_.find(block);
+    if (pages != nullptr && window_.meets_grid(block)) {
+      window_pages_.insert(window_pages_.end(), pages->begin(), pages->end());
+      page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
+    }
+    cell_pages_.push_back(static_cast<cl_uint>(window_pages_.size()));
+  }
+  pages_list_.write(window_pages_);
+  page_cells_list_.write(page_cells_);
+  cell_pages_list_.write(cell_pages_);
+}
+
+std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
+  std::vector<Page> near;
+  for (const auto& [block, pages] : index_.blocks())
+    if (window_.is_near(block, distance)) near.insert(near.end(), pages.begin(), pages.end());
+  list.write(near);
+  return near.size();
 }
 
 void SurfelMap::reserve(std::size_t additional) {
-  position_radius_.grow(slots_ + additional, slots_);
-  normal_attributes_.grow(slots_ + additional, slots_);
-  changed_.grow(slots_ + additional, slots_);
-  free_list_.grow(slots_ + additional, free_count_);
+  const std::size_t blocks = std::min<std::size_t>(additional, window_.cells());
+  grow(index_.end() + additional / PAGE_SLOTS + blocks);
 }
 
-void SurfelMap::added(std::size_t count) {
-  const std::size_t reused = std::min(count, free_count_);
-  free_count_ -= reused;
-  slots_ += count - reused;
+void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count,
+                       DeviceArray<cl_uint>& slots, std::size_t first) {
+  if (count == 0) return;
+  const auto n = static_cast<cl_uint>(count), cell_count = static_cast<cl_uint>(window_.cells());
+  const std::size_t bins = SORT_CHUNKS * window_.cells();
+  histogram_.resize(bins + 1);
+  histogram_.fill(stage, 0, bins);
+  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, histogram_());
+  lists_.scan(stage, histogram_, bins);
+  cell_begin_.resize(cell_count + 1);
+  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_count, cell_begin_());
+  order_.resize(count);
+  commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), n, histogram_(), order_());
+
+  count_free(stage);
+  missing_.resize(cell_count);
+  commands_.run(stage, "count_missing_pages", cell_count, kGroup, cell_begin_(), cell_pages_list_(), free_before_(), cell_count,
+                missing_());
+  add_pages(missing_.read(cell_count));
+  count_free(stage);
+
+  slots.grow(first + count, first);
+  commands_.run(stage, "fill_pages", window_pages(), kGroup, pages_list_(), page_cells_list_(), static_cast<cl_uint>(window_pages()),
+                cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_(), slots(),
+                static_cast<cl_uint>(first));
+  size_ += count;
+}
+
+void SurfelMap::count_free(const char* stage) {
+  free_before_.resize(window_pages() + 1);
+  if (window_pages() == 0) free_before_.fill(stage, 0, 1);
+  commands_.run(stage, "count_free", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), alive_(), free_before_());
+  lists_.scan(stage, free_before_, window_pages());
+}
+
+/// @param missing  pages that each cell's block needs
+void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
+  grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
+  std::vector<Page> pages;
+  std::vector<cl_int4> blocks;
+  for (std::size_t cell = 0; cell < missing.size(); ++cell) {
+    const BlockKey block = window_.block(static_cast<int>(cell));
+    for (cl_uint n = 0; n < missing[cell]; ++n) {
+      pages.push_back(index_.add_page(block));
+      blocks.push_back({{block.x, block.y, block.z, 0}});
+    }
+  }
+  if (pages.empty()) return;
+  new_pages_.write(pages);
+  new_blocks_.write(blocks);
+  commands_.run("in_view", "begin_new_pages", pages.size(), kGroup, new_pages_(), new_blocks_(), static_cast<cl_uint>(pages.size()),
+                alive_(), changed_(), page_block_());
+  list_window();
+}
+
+void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
+  const auto count = static_cast<cl_uint>(window_pages());
+  changes_.resize(count + 1);
+  empty_.resize(count + 1);
+  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changes_(),
+                empty_());
+  const std::vector<cl_uchar> empty = empty_.read(count);
+  for (cl_uint n = 0; n < count; ++n)
+    if (empty[n]) index_.remove_page(window_.block(static_cast<int>(page_cells_[n])), window_pages_[n]);
+}
+
+Changes SurfelMap::last_changes() {
+  const char* stage = "changes";
+  const std::uint32_t count = lists_.list_bits(stage, changes_, window_pages(), changed_slots_);
+  commands_.run(stage, "to_slots", count, kGroup, pages_list_(), changed_slots_(), count);
+  gathered_.resize(count);
+  gathered_blocks_.resize(count);
+  commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, alive_(), page_block_(), surfels_(), gathered_(),
+                gathered_blocks_());
+  const auto slots = changed_slots_.read(count);
+  const auto surfels = gathered_.read(count);
+  const auto blocks = gathered_blocks_.read(count);
+  Changes changes;
+  for (std::size_t n = 0; n < slots.size(); ++n) {
+    if (blocks[n].s[3] != 0)
+      changes.updated.push_back(to_surfel(surfels[n], blocks[n], slots[n]));
+    else
+      changes.removed.push_back(slots[n]);
+  }
+  return changes;
+}
+
+Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const {
+  Surfel surfel = unpack(packed, key_of(block), block_size_);
+  surfel.id = slot;
+  return surfel;
+}
+
+/// Brings pages to the host, some at a time.
+void SurfelMap::visit(const std::vector<Page>& pages, const PageVisitor& visitor) const {
+  const auto alive = alive_.read(index_.end());
+  const auto blocks = page_block_.read(index_.end());
+  DeviceArray<cl_uint> list(commands_);
+  DeviceArray<cl_uint4> gathered(commands_);
+  for (std::size_t begin = 0; begin < pages.size(); begin += kGathered) {
+    const std::vector<Page> some(pages.begin() + begin, pages.begin() + std::min(begin + kGathered, pages.size()));
+    list.write(some);
+    gathered.resize(PAGE_SLOTS * some.size());
+    commands_.run("changes", "gather_pages", PAGE_SLOTS * some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(),
+                  gathered());
+    const auto surfels = gathered.read(PAGE_SLOTS * some.size());
+    for (std::size_t n = 0; n < some.size(); ++n) visitor(some[n], blocks[some[n]], alive[some[n]], &surfels[PAGE_SLOTS * n]);
+  }
 }
 
 std::vector<Surfel> SurfelMap::download() const {
-  const auto positions = position_radius_.read(slots_), normals = normal_attributes_.read(slots_);
+  const auto alive = alive_.read(index_.end());
+  std::vector<Page> pages;
+  for (Page page = 0; page < alive.size(); ++page)
+    if (alive[page] != 0) pages.push_back(page);
   std::vector<Surfel> surfels;
   surfels.reserve(size());
-  for (std::size_t slot = 0; slot < slots_; ++slot)
-    if (attributes_of(normals[slot]) & SURFEL_ALIVE) surfels.push_back(to_surfel(positions[slot], normals[slot], slot));
+  visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
+    for_each_bit(alive, [&](std::uint32_t n) { surfels.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
+  });
   return surfels;
 }
 
 Changes SurfelMap::changes(std::uint64_t since) const {
-  const auto positions = position_radius_.read(slots_), normals = normal_attributes_.read(slots_);
-  const auto changed = changed_.read(slots_);
+  const auto blocks = page_block_.read(index_.end());
+  std::vector<Page> pages;
+  for (Page page = 0; page < blocks.size(); ++page)
+    if (static_cast<std::uint32_t>(blocks[page].s[3]) > since) pages.push_back(page);
   Changes changes;
-  for (std::size_t slot = 0; slot < slots_; ++slot)
-    if (changed[slot] > since) add_to(changes, static_cast<std::uint32_t>(slot), positions[slot], normals[slot]);
+  visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
+    for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
+    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+  });
   return changes;
 }
 
-void SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
-  if (surfels.size() > slots_) reserve(surfels.size() - slots_);
-  const std::size_t slots = std::max(slots_, surfels.size());
-  std::vector<cl_float4> positions(slots), normals(slots);  // zero: not alive
-  for (std::size_t slot = 0; slot < surfels.size(); ++slot) {
-    const Surfel& surfel = surfels[slot];
-    positions[slot] = {{surfel.position.x(), surfel.position.y(), surfel.position.z(), surfel.radius}};
-    normals[slot] = pack_normal(surfel);
+std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
+  BlockIndex index;
+  std::vector<cl_uint4> packed;
+  std::vector<cl_ulong> alive;
+  std::vector<cl_int4> blocks;
+  std::vector<std::uint32_t> slots;
+  double largest = 0;
+  for (const Surfel& surfel : surfels) {
+    if (!(surfel.position.cwiseAbs().maxCoeff() < kFarthest))
+      throw Error("A surfel lies more than 1000 km from the world's origin: this is no map of a robot's surroundings.");
+    const BlockKey block = block_of(surfel.position, block_size_);
+    const BlockIndex::Pages* pages = index.find(block);
+    if (pages == nullptr || alive[pages->back()] == ~cl_ulong{0}) {
+      index.add_page(block);
+      pages = index.find(block);
+      alive.push_back(0);
+      packed.resize(PAGE_SLOTS * alive.size());
+      blocks.push_back({{block.x, block.y, block.z, static_cast<cl_int>(frame)}});
+    }
+    const Page page = pages->back();
+    const auto n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page]));
+    alive[page] |= cl_ulong{1} << n;
+    slots.push_back(PAGE_SLOTS * page + n);
+    packed[slots.back()] = pack(surfel, block, block_size_);
+    largest = std::max<double>(largest, surfel.radius);
   }
-  std::vector<cl_uint> free_list;  // taken from the end: the lowest slot first
-  for (std::size_t slot = slots; slot > surfels.size(); --slot) free_list.push_back(static_cast<cl_uint>(slot - 1));
-  position_radius_.write(positions);
-  normal_attributes_.write(normals);
-  changed_.write(std::vector<cl_uint>(slots, frame));
-  free_list_.write(free_list);
-  slots_ = slots;
-  free_count_ = free_list.size();
+  grow(std::max(alive.size(), index_.end()));
+  // What was there is noted as changed as well.
+  const std::size_t before = index_.end();
+  index.skip_to(before);
+  for (; alive.size() < before; blocks.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) alive.push_back(0);
+  surfels_.write(packed);
+  alive_.write(alive);
+  page_block_.write(blocks);
+  index_ = std::move(index);
+  size_ = surfels.size();
+  largest_radius_ = largest;
+  return slots;
 }
 
-std::size_t SurfelMap::bytes() const {
-  return position_radius_.bytes() + normal_attributes_.bytes() + changed_.bytes() + free_list_.bytes();
-}
+std::size_t SurfelMap::bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() + index_.bytes(); }
 
 }  // namespace frontier_surfels

@@ -1,57 +1,110 @@
-/// The map: surfels in slots of device buffers. A surfel's slot is its id.
+/// The map: world blocks of pages of surfels in device buffers (kernels/3_surfels_in_view.cl says how). A surfel's slot is its id.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <string>
 #include <vector>
 
+#include "block_index.hpp"
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
+#include "lists.hpp"
+#include "map_window.hpp"
 #include "opencl/commands.hpp"
 
 namespace frontier_surfels {
 
-/// Surfels of slots: those alive are updated, the others removed.
-Changes to_changes(const std::vector<cl_uint>& slots, const std::vector<cl_float4>& positions, const std::vector<cl_float4>& normals);
-
 class SurfelMap {
  public:
-  explicit SurfelMap(Commands& commands);
+  SurfelMap(Commands& commands, Lists& lists, const Config& config);
 
-  std::size_t slots() const { return slots_; }            ///< used or free
-  std::size_t free_slots() const { return free_count_; }  ///< of them free
-  std::size_t size() const { return slots_ - free_count_; }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const;  ///< of all that holds surfels, or says where they are, on the device and on the host
 
-  /// Makes room for `additional` more surfels and as many free slots.
+  /// @name A frame. Kernels work on the pages of the window, and mark in `alive` and `changed` what they remove and change.
+  /// @{
+
+  /// Chooses the blocks that surfels of this view may be in.
+  void open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera);
+
+  const MapWindow& window() const { return window_; }
+  std::size_t window_pages() const { return window_pages_.size(); }
+  const cl::Buffer& window_pages_list() const { return pages_list_(); }
+
+  /// Lists the pages within a distance [m] of the window, for compute_known_hull. @return how many
+  std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
+
+  /// Makes room for `additional` more surfels of this window.
   void reserve(std::size_t additional);
 
-  /// Accounts for `count` surfels that a kernel has put into new_slot(0 ... count - 1).
-  void added(std::size_t count);
+  /// Puts surfels of the window into the map, and their slots behind the first `first` of `slots`.
+  void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count,
+              DeviceArray<cl_uint>& slots, std::size_t first);
 
-  /// Accounts for `count` slots that a kernel has put behind the free ones.
-  void removed(std::size_t count) { free_count_ += count; }
+  /// Accounts for surfels that a kernel has removed.
+  void removed(std::size_t count) { size_ -= count; }
 
-  /// All surfels by slot, those not alive left out.
+  /// Notes which pages the frame has changed, and frees empty ones.
+  void finish_frame(const char* stage, std::uint32_t frame);
+
+  /// What the last frame has changed. Only until the next one begins.
+  Changes last_changes();
+  /// @}
+
+  /// All surfels by slot.
   std::vector<Surfel> download() const;
 
-  /// Surfels changed after frame `since`, and slots that were freed.
+  /// Surfels of all pages changed after frame `since`, changed or not, and slots there that hold none.
   Changes changes(std::uint64_t since) const;
 
-  /// Replaces everything: surfel n goes to slot n, changed in `frame`; what was there is noted as changed as well.
-  void replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
+  /// Replaces everything, as frame `frame`. Gives every block pages in the order in which its surfels come. @return slot of each surfel
+  std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
-  std::size_t bytes() const;
-
-  const cl::Buffer& position_radius() const { return position_radius_(); }
-  const cl::Buffer& normal_attributes() const { return normal_attributes_(); }
+  const cl::Buffer& surfels() const { return surfels_(); }
+  const cl::Buffer& alive() const { return alive_(); }
+  const cl::Buffer& page_block() const { return page_block_(); }
   const cl::Buffer& changed() const { return changed_(); }
-  const cl::Buffer& free_list() const { return free_list_(); }
 
  private:
-  std::size_t slots_ = 0;
-  std::size_t free_count_ = 0;
-  DeviceArray<cl_float4> position_radius_;
-  DeviceArray<cl_float4> normal_attributes_;
-  DeviceArray<cl_uint> changed_;
-  DeviceArray<cl_uint> free_list_;
+  using Page = std::uint32_t;
+  using PageVisitor = std::function<void(Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* surfels)>;
+  void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
+  void grow(std::size_t pages);
+  void list_window();
+  void add_pages(const std::vector<cl_uint>& missing);
+  void count_free(const char* stage);
+  Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
+
+  Commands& commands_;
+  Lists& lists_;
+  const double block_size_;  ///< [m]
+  double largest_radius_;    ///< of all surfels that have ever been in the map [m]
+  const double thickness_;   ///< [voxel]
+  std::size_t size_ = 0;
+  BlockIndex index_;
+
+  // By slot or page
+  DeviceArray<cl_uint4> surfels_;
+  DeviceArray<cl_ulong> alive_, changed_;
+  DeviceArray<cl_int4> page_block_;
+
+  // This frame's window: pages by cell
+  MapWindow window_;
+  std::vector<Page> window_pages_;
+  std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
+  DeviceArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_;
+
+  // Insertion
+  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_, new_pages_;
+  DeviceArray<cl_int4> new_blocks_;
+
+  // Changes
+  DeviceArray<cl_ulong> changes_;
+  DeviceArray<cl_uchar> empty_;
+  DeviceArray<cl_uint> changed_slots_;
+  DeviceArray<cl_uint4> gathered_;
+  DeviceArray<cl_int4> gathered_blocks_;
 };
 
 }  // namespace frontier_surfels

@@ -64,10 +64,10 @@ class DeviceArray {
   /// Makes room for `size` elements; what it held is lost if it grows.
   void resize(std::size_t size) { grow(size, 0); }
 
-  /// Makes room for `size` elements, with some to spare, and keeps the first `kept`.
-  void grow(std::size_t size, std::size_t kept) {
+  /// Makes room for `size` elements, with one of `spare` ahead, and keeps the first `kept`.
+  void grow(std::size_t size, std::size_t kept, std::size_t spare = 4) {
     if (size <= capacity_) return;
-    const std::size_t larger = size + size / 4;
+    const std::size_t larger = size + size / spare;
     const cl::Buffer bigger = commands_->allocate(larger * sizeof(T));
     if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
     commands_->release(capacity_ * sizeof(T));

@@ -1,0 +1,50 @@
+#include "lists.hpp"
+
+#include "0_shared.h"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kScanFew = 2048;  // so many values one work item scans alone
+
+}  // namespace
+
+Lists::Lists(Commands& commands)
+    : commands_(commands),
+      counts_(commands),
+      levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
+              DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
+
+std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
+  if (count == 0) return 0;
+  scan_level(stage, values, count, 0);
+  return values.read_one(count);
+}
+
+void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
+  const auto n = static_cast<cl_uint>(count);
+  if (count <= kScanFew) {
+    commands_.run(stage, "scan_few", 1, 1, values(), n);
+    return;
+  }
+  DeviceArray<cl_uint>& sums = levels_[level];
+  const std::size_t chunks = (count + SCAN_CHUNK - 1) / SCAN_CHUNK;
+  sums.resize(chunks + 1);
+  commands_.run(stage, "sum_chunks", chunks, kGroup, values(), n, sums());
+  scan_level(stage, sums, chunks, level + 1);
+  commands_.run(stage, "scan_chunks", chunks, kGroup, values(), n, sums());
+}
+
+std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
+  if (count == 0) return 0;
+  const auto n = static_cast<cl_uint>(count);
+  counts_.resize(count + 1);
+  commands_.run(stage, "count_bits", count, kGroup, bits(), n, counts_());
+  const std::uint32_t total = scan(stage, counts_, count);
+  list.resize(total);
+  if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), n, counts_(), list());
+  return total;
+}
+
+}  // namespace frontier_surfels

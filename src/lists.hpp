@@ -1,0 +1,28 @@
+/// Lists in a fixed order from bits and counts on the device, the same on any number of threads.
+#pragma once
+
+#include <cstdint>
+
+#include "opencl/commands.hpp"
+
+namespace frontier_surfels {
+
+class Lists {
+ public:
+  explicit Lists(Commands& commands);
+
+  /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total. @return the total
+  std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
+
+  /// The numbers 64 n + bit of set bits, ascending. @param count  words. @return how many
+  std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
+
+ private:
+  void scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level);
+
+  Commands& commands_;
+  DeviceArray<cl_uint> counts_;
+  DeviceArray<cl_uint> levels_[5];  ///< sums of chunks, of chunks of chunks, ...
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,42 @@
+/// The part of the map around a view's grid - what a frame works on, however large the map is.
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "0_shared.h"
+#include "block_key.hpp"
+
+namespace frontier_surfels {
+
+class MapWindow {
+ public:
+  MapWindow() = default;
+
+  /// @param margin  how far surfels beyond the grid may reach into it [m]
+  MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin);
+
+  const Window& window() const { return window_; }
+  const Eigen::Isometry3d& T_camera_local() const { return T_camera_local_; }
+  int cells() const { return window_.size_x * window_.size_y * window_.size_z; }
+  BlockKey block(int cell) const;
+
+  /// Could a surfel of this block reach into the grid? Generous.
+  bool meets_grid(const BlockKey& block) const;
+
+  /// Is the block within `distance` [m] of the window?
+  bool is_near(const BlockKey& block, double distance) const;
+
+ private:
+  Eigen::Vector3d corner(const BlockKey& block) const;  ///< local frame [m]
+
+  Grid grid_ = {};
+  Window window_ = {};
+  Eigen::Isometry3d T_camera_local_ = Eigen::Isometry3d::Identity();  ///< of an empty window only
+  double sphere_ = 0;                                                 ///< radius of a ball around a block and its surfels' reach [m]
+  double z_far_ = 0;                                                  ///< depth at which the grid ends [m]
+};
+
+/// Edge of the blocks for a range [m]: a power of two, half a metre where the range is short.
+double block_size_for(double z_max);
+
+}  // namespace frontier_surfels
