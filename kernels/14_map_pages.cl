@@ -1,4 +1,4 @@
-// The pages of the map: where new surfels go, what a frame has changed, and pages for the host. The map is described in 3_surfels_in_view.
+// The pages of the map: where new surfels go, what a frame has changed, and pages for the host. The map is described in 1_surfels.
 //
 // New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: the same on any
 // number of threads. For that they are sorted by cell (block of the window), the list's order kept in each.
@@ -55,20 +55,18 @@ __kernel void count_missing_pages(__global const uint* cell_begin, __global cons
 
 // One work item a page of the window, by cell: its free slots take their share of the cell's new surfels.
 //   in  page_cells[count]: cell of each page
-//   i/o the map;   out slots[...]: slot of each new surfel
+//   i/o the map
 __kernel void fill_pages(__global const uint* pages, __global const uint* page_cells, const uint count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
-                         __global const uint4* new_surfels, __global ulong* alive, __global ulong* changed, __global uint4* surfels,
-                         __global uint* slots, const uint first) {
+                         __global const uint4* new_surfels, __global ulong* alive, __global ulong* changed, __global uint4* surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
   uint at = cell_begin[cell] + free_before[n] - free_before[cell_pages[cell]];
   ulong taken = 0;
   for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
-    const uint bit = (uint)lowest_bit(left), slot = PAGE_SLOTS * page + bit;
-    surfels[slot] = new_surfels[order[at]];
-    slots[first + order[at]] = slot;
+    const uint bit = (uint)lowest_bit(left);
+    surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
     taken |= 1ul << bit;
   }
   alive[page] |= taken;

@@ -19,12 +19,27 @@ INLINE int floor_int(float x) {
   return above - ((float)above > x ? 1 : 0);
 }
 
+INLINE int8 floor_int8(float8 x) {
+  const int8 above = convert_int8(x);
+  return above + (convert_float8(above) > x);
+}
+
+// ln x for normal x > 0, within 2e-7; unlike log() the same on every device. x = 2^e m, m around 1: ln m = 2 artanh((m - 1) / (m + 1)).
+#define DEFINE_NATURAL_LOG(NAME, FLOAT, AS_INT, AS_FLOAT, TO_FLOAT)                                                    \
+  INLINE FLOAT NAME(FLOAT x) {                                                                                         \
+    const FLOAT m = AS_FLOAT(((AS_INT(x) - 0x3f3504f3) & 0x007fffff) + 0x3f3504f3);                                    \
+    const FLOAT exponent = TO_FLOAT((AS_INT(x) - 0x3f3504f3) >> 23), s = (m - 1.0f) / (m + 1.0f), q = s * s;           \
+    return exponent * 0.69314718f + s * (2.0f + q * (0.66666667f + q * (0.4f + q * (0.28571429f + q * 0.22222222f)))); \
+  }
+DEFINE_NATURAL_LOG(natural_log, float, as_int, as_float, (float))
+DEFINE_NATURAL_LOG(natural_log8, float8, as_int8, as_float8, convert_float8)
+
 // F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.
 INLINE float3 to_grid(const Grid* g, float3 p) {
   if (p.z < g->z_min) {
     return (float3)(p.x * g->fx / g->z_min + g->center_i, p.y * g->fy / g->z_min + g->center_j, p.z / g->delta_min + (float)g->padding_k);
   }
-  return (float3)(p.x * g->fx / p.z + g->center_i, p.y * g->fy / p.z + g->center_j, g->f * log(p.z / g->z_min) + g->k_min);
+  return (float3)(p.x * g->fx / p.z + g->center_i, p.y * g->fy / p.z + g->center_j, g->f * natural_log(p.z / g->z_min) + g->k_min);
 }
 
 // F^-1: grid coordinates -> camera frame [m].

@@ -60,15 +60,27 @@ INLINE bool view_knows(const View* view, __global const float* depths, float3 p)
   return p.z < fabs(depths[view->first_pixel + (int)t * view->width + (int)s]);
 }
 
+// The same for eight points. @return -1 (all bits) where the view knows the point
+INLINE int8 view_knows_eight(const View* view, __global const float* depths, float8 x, float8 y, float8 z) {
+  const float8 s = x * view->fx / z + view->cx + 0.5f, t = y * view->fy / z + view->cy + 0.5f;
+  const int8 seen = z > 0.0f && s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height;
+  const int8 pixel = select((int8)(0), convert_int8(t) * view->width + convert_int8(s), seen);
+  __global const float* depth = depths + view->first_pixel;
+  const float8 d = (float8)(depth[pixel.s0], depth[pixel.s1], depth[pixel.s2], depth[pixel.s3], depth[pixel.s4], depth[pixel.s5],
+                            depth[pixel.s6], depth[pixel.s7]);
+  return seen && z < fabs(d);
+}
+
 // Pixel whose column of voxels holds v, -1 if it is in the padding.
 INLINE int pixel_of(const Grid* g, int3 v) {
   const int s = v.x - g->padding_i, t = v.y - g->padding_j;
   return s < 0 || t < 0 || s >= g->width || t >= g->height ? -1 : t * g->width + s;
 }
 
-// Is voxel v at the measured surface that ended its column, or a point of it, at depth z, at most `surface_depth` behind that?
-INLINE bool at_surface(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, int3 v, float z) {
-  const int pixel = pixel_of(g, v);
-  if (pixel < 0 || (float)v.z <= g->k_min || depth[pixel] <= 0.0f) return false;
-  return (v.z == column_end[pixel] && v.z > g->first_pyramid_layer) || (z >= depth[pixel] && z <= depth[pixel] + surface_depth);
+// Is layer k of a pixel's column, or a point there at depth z, at the measured surface that ended the column, or at most `surface_depth`
+// behind it?
+//   depth, column_end: of the pixel
+INLINE bool at_surface(const Grid* g, float depth, int column_end, float surface_depth, int k, float z) {
+  if ((float)k <= g->k_min || depth <= 0.0f) return false;
+  return (k == column_end && k > g->first_pyramid_layer) || (z >= depth && z <= depth + surface_depth);
 }

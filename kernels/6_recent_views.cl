@@ -70,7 +70,8 @@ __kernel void close_gaps(const Grid g, const Limits limits, const View view, __g
     const int bit = lowest_bit(left);
     const int3 v = (int3)(i, j, 64 * w + bit);
     const float3 center = voxel_center(&g, layer_depth, v);
-    if (at_surface(&g, depth, column_end, limits.surface_depth, v, center.z)) continue;
+    const int pixel = pixel_of(&g, v);
+    if (pixel >= 0 && at_surface(&g, depth[pixel], column_end[pixel], limits.surface_depth, v.z, center.z)) continue;
     const float3 direction = observed_direction(&g, layer_depth, observed, v);
     if (length(direction) < limits.normal_min) continue;
     const float3 behind = center - limits.min_gap * normalize(direction);

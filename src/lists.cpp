@@ -36,14 +36,17 @@ void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::siz
   commands_.run(stage, "scan_chunks", chunks, kGroup, values(), n, sums());
 }
 
-std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
+std::uint32_t Lists::count_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count) {
   if (count == 0) return 0;
-  const auto n = static_cast<cl_uint>(count);
   counts_.resize(count + 1);
-  commands_.run(stage, "count_bits", count, kGroup, bits(), n, counts_());
-  const std::uint32_t total = scan(stage, counts_, count);
+  commands_.run(stage, "count_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_());
+  return scan(stage, counts_, count);
+}
+
+std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
+  const std::uint32_t total = count_bits(stage, bits, count);
   list.resize(total);
-  if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), n, counts_(), list());
+  if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_(), list());
   return total;
 }
 

@@ -14,6 +14,9 @@ class Lists {
   /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total. @return the total
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
 
+  /// @param count  words. @return set bits in them
+  std::uint32_t count_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count);
+
   /// The numbers 64 n + bit of set bits, ascending. @param count  words. @return how many
   std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
 

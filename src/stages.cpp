@@ -6,7 +6,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kGroup = 64;  // work items of a group, where kernels do not say otherwise
+constexpr std::size_t kGroup = 64;       // work items of a group, where kernels do not say otherwise
+constexpr std::size_t kGroupOfPage = 8;  // of kernels whose work items do eight surfels each
 constexpr double kHullReach = 2;    // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
@@ -57,9 +58,8 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       large_bits_(commands),
       removed_bits_(commands),
       in_view_slots_(commands),
-      split_list_(commands),
+      split_slots_(commands),
       split_offsets_(commands),
-      removed_list_(commands),
       created_voxels_(commands),
       view_surfels_(commands),
       new_surfels_(commands),
@@ -127,46 +127,47 @@ std::size_t Stages::select_in_view() {
   const char* stage = "in_view";
   const std::size_t pages = map_.window_pages();
   in_view_bits_.resize(pages + 1);
-  commands_.run(stage, "mark_in_view", PAGE_SLOTS * pages, PAGE_SLOTS, grid_, limits_, window_, T_camera_local_, map_.window_pages_list(),
-                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_());
-  in_view_ = lists_.list_bits(stage, in_view_bits_, pages, in_view_slots_);
-  commands_.run(stage, "to_slots", in_view_, kGroup, map_.window_pages_list(), in_view_slots_(), static_cast<cl_uint>(in_view_));
-  return in_view_;
+  large_bits_.resize(pages + 1);
+  commands_.run(stage, "mark_in_view", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, map_.pages(),
+                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_(), large_bits_());
+  return lists_.count_bits(stage, in_view_bits_, pages);
 }
 
 std::size_t Stages::split_surfels() {
   const char* stage = "split";
-  const std::size_t before = in_view_;
-  place_surfels(0);
-  const std::uint32_t parents = lists_.list_bits(stage, large_bits_, (in_view_ + 63) / 64, split_list_);
+  const std::uint32_t parents = lists_.list_bits(stage, large_bits_, map_.window_pages(), split_slots_);
   if (parents == 0) return 0;
+  commands_.run(stage, "to_slots", parents, kGroup, map_.pages(), split_slots_(), parents);
   split_offsets_.resize(parents + 1);
-  commands_.run(stage, "count_children", parents, kGroup, grid_, limits_, view_surfels_(), split_list_(), parents, split_offsets_());
+  commands_.run(stage, "count_children", parents, kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
+                split_slots_(), parents, split_offsets_());
   const std::uint32_t children = lists_.scan(stage, split_offsets_, parents);
   map_.reserve(children);
   new_surfels_.resize(children);
   new_cells_.resize(children);
-  commands_.run(stage, "split", parents, kGroup, grid_, limits_, window_, map_.page_block(), map_.surfels(), view_surfels_(), split_list_(),
-                parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
+  commands_.run(stage, "split", parents, kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
+                split_slots_(), parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
   map_.removed(parents);
-  map_.insert(stage, new_surfels_, new_cells_, children, in_view_slots_, in_view_);
-  in_view_ += children;
-  place_surfels(before);
+  map_.insert(stage, new_surfels_, new_cells_, children);
+  select_in_view();
   return children - parents;
 }
 
-/// Surfels in view, beginning with number `first`.
-void Stages::place_surfels(std::size_t first) {
-  view_surfels_.grow(std::max<std::size_t>(in_view_, 1), first);  // the sign field is computed without surfels, too
-  large_bits_.resize((in_view_ - first) / 64 + 1);
-  commands_.run("split", "place_surfels", in_view_ - first, 64, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
-                in_view_slots_(), static_cast<cl_uint>(first), static_cast<cl_uint>(in_view_), view_surfels_(), large_bits_());
+void Stages::place_surfels() {
+  const char* stage = "sign_field";
+  in_view_ = lists_.list_bits(stage, in_view_bits_, map_.window_pages(), in_view_slots_);
+  const auto count = static_cast<cl_uint>(in_view_);
+  view_surfels_.resize(std::max<std::size_t>(in_view_, 1));  // the sign field is computed without surfels, too
+  commands_.run(stage, "to_slots", in_view_, kGroup, map_.pages(), in_view_slots_(), count);
+  commands_.run(stage, "place_surfels", in_view_, kGroup, grid_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
+                in_view_slots_(), count, view_surfels_());
 }
 
 void Stages::assume_unknown() { filtered_.fill("median", 0, words()); }
 
 void Stages::compute_sign_field() {
   const char* stage = "sign_field";
+  place_surfels();
   const auto up = [](int size, int tile) { return static_cast<std::size_t>((size + tile - 1) / tile); };
   const std::size_t tiles = up(grid_.size_i, TILE_I) * up(grid_.size_j, TILE_J) * grid_.words_k * (64 / TILE_K);
   const auto count = static_cast<cl_uint>(in_view_);
@@ -206,11 +207,12 @@ void Stages::filter_median() { commands_.run("median", "median", words(), kGroup
 
 void Stages::mark_removed() {
   const char* stage = "removal";
+  const std::size_t pages = map_.window_pages();
   occupied_voxels_.fill(stage, 0, words());
-  removed_bits_.resize((in_view_ + 63) / 64 + 1);
-  commands_.run(stage, "mark_removed", in_view_, 64, grid_, limits_, window_, T_camera_local_, own_view(),
-                static_cast<cl_int>(config_.remove_buried), views_.depths(), view_surfels_(), static_cast<cl_uint>(in_view_),
-                map_.page_block(), map_.surfels(), observed_(), occupied_voxels_(), removed_bits_());
+  removed_bits_.resize(pages + 1);
+  commands_.run(stage, "mark_removed", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, own_view(),
+                static_cast<cl_int>(config_.remove_buried), views_.depths(), map_.pages(), in_view_bits_(), map_.page_block(),
+                map_.surfels(), observed_(), occupied_voxels_(), removed_bits_());
 }
 
 void Stages::find_candidates() {
@@ -236,16 +238,16 @@ void Stages::filter_candidates() {
 }
 
 std::size_t Stages::remove_surfels() {
+  const char* stage = "removal";
   created_count_ = lists_.list_bits("creation", candidates_, words(), created_voxels_);
-  removed_count_ = lists_.list_bits("removal", removed_bits_, (in_view_ + 63) / 64, removed_list_);
   map_.reserve(created_count_);
-  in_view_slots_.grow(in_view_ + created_count_, in_view_);
   new_surfels_.resize(created_count_);
   new_cells_.resize(created_count_);
-  commands_.run("removal", "remove_surfels", removed_count_, kGroup, removed_list_(), static_cast<cl_uint>(removed_count_), view_surfels_(),
-                map_.alive(), map_.changed());
-  map_.removed(removed_count_);
-  return removed_count_;
+  const std::size_t pages = map_.window_pages(), count = lists_.count_bits(stage, removed_bits_, pages);
+  commands_.run(stage, "remove_surfels", pages, kGroup, map_.pages(), static_cast<cl_uint>(pages), removed_bits_(), map_.alive(),
+                map_.changed());
+  map_.removed(count);
+  return count;
 }
 
 std::size_t Stages::create_surfels() {
@@ -254,14 +256,13 @@ std::size_t Stages::create_surfels() {
                 static_cast<cl_int>(config_.refine_surfels), own_view(), views_.views(), static_cast<cl_int>(views_.count()),
                 views_.depths(), layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), new_surfels_(),
                 new_cells_());
-  map_.insert(stage, new_surfels_, new_cells_, created_count_, in_view_slots_, in_view_);
-  in_view_ += created_count_;
+  map_.insert(stage, new_surfels_, new_cells_, created_count_);
   return created_count_;
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", in_view_, kGroup, grid_, limits_, window_, T_camera_local_, depth_(), column_end_(), color_(),
-                static_cast<cl_int>(has_color_), in_view_slots_(), static_cast<cl_uint>(in_view_), map_.alive(), map_.page_block(),
+  commands_.run("labels", "label_surfels", kGroupOfPage * map_.window_pages(), kGroupOfPage, grid_, limits_, window_, T_camera_local_,
+                depth_(), column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), map_.alive(), map_.page_block(),
                 map_.surfels(), map_.changed());
 }
 

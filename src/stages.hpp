@@ -49,7 +49,7 @@ class Stages {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
-  void place_surfels(std::size_t first);
+  void place_surfels();
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   View own_view() const;  ///< this frame's, as the camera itself sees it
@@ -69,7 +69,7 @@ class Stages {
   View view_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
-  std::size_t in_view_ = 0, removed_count_ = 0, created_count_ = 0;
+  std::size_t in_view_ = 0, created_count_ = 0;
 
   // Image and grid
   DeviceArray<float> depth_, layer_depth_;
@@ -83,7 +83,7 @@ class Stages {
 
   // Surfels in view
   DeviceArray<cl_ulong> in_view_bits_, large_bits_, removed_bits_;
-  DeviceArray<cl_uint> in_view_slots_, split_list_, split_offsets_, removed_list_, created_voxels_;
+  DeviceArray<cl_uint> in_view_slots_, split_slots_, split_offsets_, created_voxels_;
   DeviceArray<ViewSurfel> view_surfels_;
   DeviceArray<cl_uint4> new_surfels_;
   DeviceArray<cl_uint> new_cells_, near_pages_;

@@ -103,8 +103,7 @@ void SurfelMap::reserve(std::size_t additional) {
   grow(index_.end() + additional / PAGE_SLOTS + blocks);
 }
 
-void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count,
-                       DeviceArray<cl_uint>& slots, std::size_t first) {
+void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
   if (count == 0) return;
   const auto n = static_cast<cl_uint>(count), cell_count = static_cast<cl_uint>(window_.cells());
   const std::size_t bins = SORT_CHUNKS * window_.cells();
@@ -124,10 +123,8 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   add_pages(missing_.read(cell_count));
   count_free(stage);
 
-  slots.grow(first + count, first);
   commands_.run(stage, "fill_pages", window_pages(), kGroup, pages_list_(), page_cells_list_(), static_cast<cl_uint>(window_pages()),
-                cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_(), slots(),
-                static_cast<cl_uint>(first));
+                cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_());
   size_ += count;
 }
 

@@ -1,4 +1,4 @@
-/// The map: world blocks of pages of surfels in device buffers (kernels/3_surfels_in_view.cl says how). A surfel's slot is its id.
+/// The map: world blocks of pages of surfels in device buffers (kernels/1_surfels.cl says how). A surfel's slot is its id.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ class SurfelMap {
 
   const MapWindow& window() const { return window_; }
   std::size_t window_pages() const { return window_pages_.size(); }
-  const cl::Buffer& window_pages_list() const { return pages_list_(); }
+  const cl::Buffer& pages() const { return pages_list_(); }
 
   /// Lists the pages within a distance [m] of the window, for compute_known_hull. @return how many
   std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
@@ -38,9 +38,8 @@ class SurfelMap {
   /// Makes room for `additional` more surfels of this window.
   void reserve(std::size_t additional);
 
-  /// Puts surfels of the window into the map, and their slots behind the first `first` of `slots`.
-  void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count,
-              DeviceArray<cl_uint>& slots, std::size_t first);
+  /// Puts surfels into the map. @param cells  of the window, for each surfel
+  void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count);
 
   /// Accounts for surfels that a kernel has removed.
   void removed(std::size_t count) { size_ -= count; }

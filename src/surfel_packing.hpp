@@ -1,4 +1,4 @@
-/// A surfel in 16 bytes, as kernels/3_surfels_in_view.cl packs it.
+/// A surfel in 16 bytes, as kernels/1_surfels.cl packs it.
 #pragma once
 
 #include "block_key.hpp"
