@@ -98,16 +98,20 @@ void Stages::set_grid(const WorkingImage& image) {
 }
 
 void Stages::allocate_grid() {
-  observed_.resize(words());
-  known_.resize(words());
-  filtered_.resize(words());
-  occupied_voxels_.resize(words());
-  candidates_.resize(words());
-  events_.resize(3 * EVENT_PLANES * words());
+  observed_.allocate(words());
+  filtered_.allocate(words());
+  occupied_voxels_.allocate(words());
+  candidates_.allocate(words());
+}
+
+/// What only section 4 of the method needs, and not before it does: half of the memory.
+void Stages::allocate_paths() {
+  known_.allocate(words());
+  events_.allocate(3 * EVENT_PLANES * words());
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
-  lines_.resize(line_numbers());
-  hull_faces_.resize(2 * (j * k + i * k + i * j));
-  hull_.resize(2 * (j * w + i * w + i * j));
+  lines_.allocate(line_numbers());
+  hull_faces_.allocate(2 * (j * k + i * k + i * j));
+  hull_.allocate(2 * (j * w + i * w + i * j));
 }
 
 View Stages::own_view() const {
@@ -229,6 +233,7 @@ void Stages::settle_by_recent_views() {
     commands_.run(stage, "close_gaps", words(), kGroup, grid_, limits_, own_view(), views_.views(), count, views_.depths(), layer_depth_(),
                   depth_(), column_end_(), observed_(), candidates_());
   if (!is_open()) return;
+  allocate_paths();
   lines_.fill(stage, 0, line_numbers());
   commands_.run(stage, "mark_lines", words(), kGroup, grid_, candidates_(), lines_());
 }

@@ -52,6 +52,7 @@ class Stages {
   void place_surfels();
   void set_grid(const WorkingImage& image);
   void allocate_grid();
+  void allocate_paths();
   View own_view() const;  ///< this frame's, as the camera itself sees it
 
   Commands& commands_;

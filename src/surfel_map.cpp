@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
 constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
-constexpr std::size_t kSpare = 8;           // one page of so many is allocated ahead
+constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 

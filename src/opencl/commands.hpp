@@ -61,8 +61,11 @@ class DeviceArray {
   DeviceArray(const DeviceArray&) = delete;
   DeviceArray& operator=(const DeviceArray&) = delete;
 
-  /// Makes room for `size` elements; what it held is lost if it grows.
+  /// Makes room for `size` elements, with some to spare; what it held is lost if it grows.
   void resize(std::size_t size) { grow(size, 0); }
+
+  /// The same for a size that stays: nothing to spare.
+  void allocate(std::size_t size) { grow(size, 0, size + 1); }
 
   /// Makes room for `size` elements, with one of `spare` ahead, and keeps the first `kept`.
   void grow(std::size_t size, std::size_t kept, std::size_t spare = 4) {
