@@ -27,10 +27,10 @@ class BlockIndex {
   std::size_t end() const { return end_; }                  ///< one past the last page ever used
   std::size_t used() const { return end_ - free_.size(); }  ///< pages that belong to a block
   std::size_t bytes() const;                                ///< on the host, about
-  const std::unordered_map<BlockKey, Pages, BlockKeyHash>& blocks() const { return blocks_; }
+  const std::unordered_map<BlockKey, Pages>& blocks() const { return blocks_; }
 
  private:
-  std::unordered_map<BlockKey, Pages, BlockKeyHash> blocks_;
+  std::unordered_map<BlockKey, Pages> blocks_;
   Pages free_;  ///< taken from the end
   std::uint32_t end_ = 0;
 };

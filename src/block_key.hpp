@@ -1,25 +1,32 @@
-/// A block of the world: its place, counted in blocks from the world's origin.
+/// Which block of the map: the cube of the world whose corner lies at (x, y, z) block sizes.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <tuple>
 
 namespace frontier_surfels {
 
 struct BlockKey {
-  std::int32_t x = 0, y = 0, z = 0;
-  bool operator==(const BlockKey& other) const { return x == other.x && y == other.y && z == other.z; }
-  bool operator<(const BlockKey& other) const { return std::tie(z, y, x) < std::tie(other.z, other.y, other.x); }
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+  std::int32_t z = 0;
 };
 
-struct BlockKeyHash {
-  std::size_t operator()(const BlockKey& key) const {
-    std::uint64_t mixed = static_cast<std::uint32_t>(key.x) * 0x9E3779B97F4A7C15U;
-    mixed ^= static_cast<std::uint32_t>(key.y) * 0xC2B2AE3D27D4EB4FU;
-    mixed ^= static_cast<std::uint32_t>(key.z) * 0x165667B19E3779F9U;
-    return static_cast<std::size_t>(mixed ^ (mixed >> 32));
-  }
-};
+inline bool operator==(const BlockKey& a, const BlockKey& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+inline bool operator!=(const BlockKey& a, const BlockKey& b) { return !(a == b); }
+inline bool operator<(const BlockKey& a, const BlockKey& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
 
 }  // namespace frontier_surfels
+
+/// Neighbouring blocks fall far apart: multiplied by large odd numbers, and the high bits folded into the low ones.
+template <>
+struct std::hash<frontier_surfels::BlockKey> {
+  std::size_t operator()(const frontier_surfels::BlockKey& key) const noexcept {
+    std::uint64_t h = static_cast<std::uint32_t>(key.x) * std::uint64_t{0x9E3779B97F4A7C15};
+    h = (h ^ h >> 32 ^ static_cast<std::uint32_t>(key.y)) * std::uint64_t{0xBF58476D1CE4E5B9};
+    h = (h ^ h >> 32 ^ static_cast<std::uint32_t>(key.z)) * std::uint64_t{0x94D049BB133111EB};
+    return static_cast<std::size_t>(h ^ h >> 32);
+  }
+};

@@ -1,0 +1,71 @@
+/// Folders and contents for the tests of map folders.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+#include "map_folder.hpp"
+
+namespace frontier_surfels {
+
+using Bytes = std::vector<std::uint8_t>;
+using Content = std::map<BlockKey, Bytes>;
+
+constexpr double kBlockSize = 0.5;  // [m]
+
+inline Bytes random_bytes(std::mt19937& random, std::size_t size) {
+  Bytes bytes(size);
+  for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
+  return bytes;
+}
+
+inline Content content_of(const MapFolder& folder) {
+  Content content;
+  for (const BlockKey& key : folder.keys()) content[key] = folder.read(key);
+  return content;
+}
+
+template <typename Action>
+std::string fault_of(const Action& action) {
+  try {
+    action();
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "nothing was refused";
+}
+
+/// Whether a fault is a sentence that says this.
+inline testing::AssertionResult says(const std::string& said, const std::string& what) {
+  if (said.find(what) != std::string::npos && said.find("The map folder") == 0 && said.back() == '.') return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "said '" << said << "'";
+}
+
+class MapFolders : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "map_folder_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    path_ = (root_ / "maps" / "kitchen").string();
+    file_ = std::filesystem::path(path_) / "map.sqlite";
+  }
+  void TearDown() override { std::filesystem::remove_all(root_); }
+
+  std::string fault_of_opening(const std::string& path, double block_size = kBlockSize) {
+    return fault_of([&] { MapFolder(path, block_size); });
+  }
+
+  std::mt19937 random_{1};
+  std::filesystem::path root_, file_;
+  std::string path_;
+};
+
+}  // namespace frontier_surfels
