@@ -37,7 +37,10 @@ endforeach()
 # The command line from outside. /usr/bin: the Python that has the modules of the report.
 add_test(NAME test_replay_score
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
-set_tests_properties(test_replay_score PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+add_test(NAME test_bench
+  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_bench.py $<TARGET_FILE:bench> $<TARGET_FILE:make_synthetic>
+    ${PROJECT_SOURCE_DIR}/scripts/bench_table)
+set_tests_properties(test_replay_score test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
 
 if(FRONTIER_SURFELS_WITH_ROS)
   include(cmake/ros_tests.cmake)

@@ -83,6 +83,18 @@ TEST_F(MapperFiles, ASavedMapComesBack) {
   EXPECT_TRUE(same(other.surfels(), mapper_.surfels())) << "over a map as into an empty one";
 }
 
+TEST_F(MapperFiles, SurfelsAreLoadedAsAFileIs) {
+  mapper_.save(path_);
+  Mapper from_file(undecimated());
+  from_file.load(path_);
+  mapper_.load(surfels_);
+  EXPECT_TRUE(same(from_file.surfels(), mapper_.surfels()));
+  EXPECT_EQ(mapper_.sequence(), frames_.size() + 1);
+  EXPECT_TRUE(mapper_.integrate(frames_.back().view()).view_kept) << "the recent views are forgotten";
+  from_file.integrate(frames_.back().view());
+  EXPECT_TRUE(same(from_file.surfels(), mapper_.surfels()));
+}
+
 /// A loaded map is as good as the one that was saved: the next frames make the same of it.
 TEST_F(MapperFiles, MappingGoesOnWithALoadedMap) {
   Config config = undecimated();

@@ -44,7 +44,7 @@ class Mapper {
   /// method then trusts those a little more). @throws FileError: the map stays as it was
   void load(const std::string& path);
 
-  /// The same from memory; ids are given anew.
+  /// The same with surfels from elsewhere, as surfels() gives them; their ids are counted anew.
   void load(const std::vector<Surfel>& surfels);
 
   /// Forgets everything but the configuration and the sequence number.

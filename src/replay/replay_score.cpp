@@ -1,6 +1,4 @@
 /// replay_score: maps a recording, scores the map, and writes a report.
-#include <signal.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -10,6 +8,7 @@
 #include <optional>
 
 #include "frontier_surfels/ply.hpp"
+#include "replay/interrupt.hpp"
 #include "replay/live_replay.hpp"
 #include "replay/report_page.hpp"
 #include "replay/run.hpp"
@@ -46,18 +45,6 @@ struct RawOptions {
   bool no_exact = false;
   bool live = false;
 };
-
-volatile sig_atomic_t interrupted = 0;
-
-bool stop_requested() { return interrupted != 0; }
-
-/// The first Ctrl-C asks the run to stop after its frame; the second ends the program at once.
-void catch_first_interrupt() {
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
-  action.sa_flags = SA_RESETHAND | SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-}
 
 void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   SourceOptions& source = options.recording.options;

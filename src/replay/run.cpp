@@ -1,8 +1,9 @@
 #include "replay/run.hpp"
 
-#include <sys/resource.h>
+#include <time.h>
 
-#include "frontier_surfels/mapper.hpp"
+#include <fstream>
+
 #include "replay/progress.hpp"
 
 namespace frontier_surfels::replay {
@@ -32,30 +33,41 @@ bool Yardsticks::fit(const Config& config) const {
   return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
 }
 
-Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
-  const auto source = open_source(recording.path, recording.options);
-  Mapper mapper(config);
+Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
+               const std::function<bool()>& stop) {
   Run run;
-  run.config = config;
+  run.config = mapper.config();
   run.device = mapper.device();
 
-  Progress progress("Mapping", static_cast<double>(source->size()), "frames");
-  while (const auto frame = source->next()) {
+  Progress progress("Mapping", static_cast<double>(source.size()), "frames");
+  while (const auto frame = source.next()) {
     const DepthFrame view = frame->view();
     try {
+      const double cpu_before_ms = process_cpu_ms();
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
-      if (yardsticks != nullptr) record.octomap_ms = yardsticks->add(view);
+      record.cpu_ms = process_cpu_ms() - cpu_before_ms;
+      after_frame(view, record);
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {
       run.skipped.push_back(refused.what());
     }
-    progress.update(static_cast<double>(run.frames.size() + run.skipped.size() + source->skipped().size()));
+    progress.update(static_cast<double>(run.frames.size() + run.skipped.size() + source.skipped().size()));
     if (stop()) {
       run.stopped = true;
       break;
     }
   }
-  run.skipped.insert(run.skipped.end(), source->skipped().begin(), source->skipped().end());
+  run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
+  return run;
+}
+
+Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
+  const auto source = open_source(recording.path, recording.options);
+  Mapper mapper(config);
+  const auto measure = [yardsticks](const DepthFrame& view, FrameRecord& record) {
+    if (yardsticks != nullptr) record.octomap_ms = yardsticks->add(view);
+  };
+  Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty()) throw nothing_usable(recording, run.skipped);
 
   run.surfels = mapper.surfels();
@@ -65,9 +77,18 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
 }
 
 double peak_rss_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return usage.ru_maxrss * 1024.0 / 1e6;  // Linux gives KiB
+  // Not getrusage(): its figure includes what the process was before it became this program, a copy of the one that started it.
+  std::ifstream status("/proc/self/status");
+  double kib = 0;
+  for (std::string word; status >> word;)
+    if (word == "VmHWM:") status >> kib;
+  return kib * 1024.0 / 1e6;
+}
+
+double process_cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return time.tv_sec * 1e3 + time.tv_nsec / 1e6;
 }
 
 Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped) {

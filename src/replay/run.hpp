@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/replay/frame_source.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
 #include "frontier_surfels/scoring/octomap_truth.hpp"
@@ -49,6 +50,7 @@ struct FrameRecord {
   Report report;
   Eigen::Isometry3d T_world_camera;
   std::optional<double> octomap_ms;
+  double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
 };
 
 /// What mapping a recording gave.
@@ -63,7 +65,13 @@ struct Run {
   bool stopped = false;    ///< before the recording's end
 };
 
-/// Maps a recording frame by frame.
+/// Maps what is left of `source` frame by frame. The map itself, its statistics and the peak memory are left to the caller.
+/// @param after_frame  called with every frame that the mapper took, and its record
+/// @param stop         asked after every frame whether to leave the rest
+Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
+               const std::function<bool()>& stop);
+
+/// Maps a recording.
 /// @param yardsticks  if not null: filled with the frames that the mapper took
 /// @param stop        asked after every frame whether to leave the rest
 /// @throws Error      also when not one frame could be used
@@ -74,6 +82,9 @@ Error nothing_usable(const Recording& recording, const std::vector<std::string>&
 
 /// [10^6 byte] of this process, so far.
 double peak_rss_mb();
+
+/// [ms] user and system time of this process, so far.
+double process_cpu_ms();
 
 /// Scores of a map; empty where there is no such yardstick.
 struct Scores {

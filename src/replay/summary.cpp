@@ -48,16 +48,6 @@ double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
 
 double octomap_ms(const FrameRecord& frame) { return frame.octomap_ms.value_or(0); }
 
-ordered_json time_json(const std::vector<FrameRecord>& frames, const std::vector<std::string>& names) {
-  const TimeStatistics total = time_statistics(column(frames, total_ms));
-  ordered_json stages = ordered_json::object();
-  for (const std::string& name : names) {
-    stages[name] = mean_and_median(column(frames, [&name](const FrameRecord& frame) { return stage_ms(frame, name); }));
-  }
-  return {{"mean", total.mean}, {"median", total.median},           {"p95", total.p95},
-          {"max", total.max},   {"rsd_percent", total.rsd_percent}, {"stages", stages}};
-}
-
 std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
   char text[200];
   std::snprintf(text, sizeof(text), format, a, b, c, d);
@@ -94,6 +84,16 @@ std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames) {
     }
   }
   return names;
+}
+
+ordered_json time_json(const std::vector<FrameRecord>& frames, const std::vector<std::string>& names) {
+  const TimeStatistics total = time_statistics(column(frames, total_ms));
+  ordered_json stages = ordered_json::object();
+  for (const std::string& name : names) {
+    stages[name] = mean_and_median(column(frames, [&name](const FrameRecord& frame) { return stage_ms(frame, name); }));
+  }
+  return {{"mean", total.mean}, {"median", total.median},           {"p95", total.p95},
+          {"max", total.max},   {"rsd_percent", total.rsd_percent}, {"stages", stages}};
 }
 
 ordered_json config_json(const Config& config) {

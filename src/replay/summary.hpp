@@ -24,6 +24,11 @@ std::vector<FrameRecord> warm_frames(const std::vector<FrameRecord>& frames);
 /// Names of all stages in the paper's order, those that did not run in the first frame included.
 std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames);
 
+/// Times of whole frames, and mean and median of every stage [ms].
+/// @param frames  not empty
+/// @param names   of the stages
+nlohmann::ordered_json time_json(const std::vector<FrameRecord>& frames, const std::vector<std::string>& names);
+
 nlohmann::ordered_json config_json(const Config& config);
 nlohmann::ordered_json octomap_json(const scoring::OctomapScore& score);
 nlohmann::ordered_json exact_json(const scoring::ExactScore& score);

@@ -1,0 +1,139 @@
+/// bench: what a frame costs in time and memory, as tables and as JSON.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <thread>
+
+#include "bench/sections.hpp"
+#include "frontier_surfels/mapper.hpp"
+#include "replay/interrupt.hpp"
+#include "replay/summary.hpp"
+
+namespace frontier_surfels::bench {
+
+const std::vector<Section>& sections() {
+  static const std::vector<Section> all = {
+      {"frames", "whole frames: image sizes, depth ranges, threads", measure_frames},
+      {"stages", "one frame again and again: the stages' steadiest times", measure_stages},
+      {"octomap", "OctoMap's insertPointCloud beside ours", measure_octomap},
+      {"map_size", "1 to 50 million surfels in the map", measure_map_size},
+      {"start", "start-up with and without built kernels", measure_start},
+      {"memory", "of the map, beside the map, and of the process", measure_memory},
+  };
+  return all;
+}
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+void declare_options(CLI::App& app, Options& options) {
+  std::vector<std::string> names;
+  std::string footer = "Sections, all of them unless --only names some:\n";
+  for (const Section& section : sections()) {
+    names.push_back(section.name);
+    footer += "  " + names.back() + std::string(10 - names.back().size(), ' ') + section.what + "\n";
+  }
+  app.footer(footer);
+  app.add_option("INPUT", options.inputs, "bags, or folders as replay_score takes them; none: a synthetic room");
+  app.add_option("--frames", options.frames, "of each input, from its first on, 100 unless given; 0: all")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--only", options.sections, "some of the sections below")->type_name("SECTION...")->check(CLI::IsMember(names));
+  app.add_option("--octomap-frames", options.octomap_frames, "frames for OctoMap, taken evenly, 20 unless given; 0: all")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--row-seconds", options.row_seconds, "a row takes frames for so long, 120 unless given")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--config", options.config_file,
+                 "parameters of the mapper; decimation and, where they are varied, z_max and threads are set")
+      ->type_name("FILE.yaml");
+  app.add_option("--json", options.json, "where all numbers are written")->type_name("FILE");
+  app.add_flag("--quick", options.quick, "a few small frames, to see that everything runs: the numbers mean nothing");
+  app.add_option("--child", options.child)->check(CLI::IsMember({"start", "memory"}))->group("");  // see child_process.hpp
+}
+
+/// @throws CLI::Error (also for help, with exit code 0), Error
+Options parse(int argc, char** argv) {
+  Options options;
+  CLI::App app("Measures what a frame costs: prints tables, and writes JSON.", "bench");
+  declare_options(app, options);
+  try {
+    app.parse(argc, argv);
+    if (!options.config_file.empty()) options.config = load_config(options.config_file);
+    std::string problems;
+    for (const std::string& problem : options.config.problems()) problems += problem + "\n";
+    if (!problems.empty()) throw CLI::ValidationError("", problems);
+  } catch (const CLI::CallForHelp&) {
+    std::cout << app.help();
+    throw;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
+    throw;
+  }
+  constexpr int kQuickFrames = 4;
+  if (options.quick && (options.frames == 0 || options.frames > kQuickFrames)) options.frames = kQuickFrames;
+  return options;
+}
+
+bool wanted(const Options& options, const Section& section) {
+  return options.sections.empty() || std::find(options.sections.begin(), options.sections.end(), section.name) != options.sections.end();
+}
+
+void measure(const Options& options) {
+  const std::vector<Input> inputs = open_inputs(options);
+  const std::string device = Mapper(options.config).device();
+  ordered_json json = {{"device", device},
+                       {"processors", std::thread::hardware_concurrency()},
+                       {"frames", options.frames},
+                       {"quick", options.quick},
+                       {"complete", false},
+                       {"config", replay::config_json(options.config)},
+                       {"sections", ordered_json::object()}};
+  const auto write = [&] {
+    if (!options.json.empty()) replay::write_file(options.json, json.dump(2) + "\n");
+  };
+  write();  // hours before it is needed
+  replay::catch_first_interrupt();
+  std::cout << device << std::endl;
+  for (const Section& section : sections()) {
+    if (!wanted(options, section) || replay::stop_requested()) continue;
+    json["sections"][section.name] = section.measure(options, inputs);
+    write();
+  }
+  json["complete"] = !replay::stop_requested();
+  write();
+  if (replay::stop_requested()) std::cerr << "Stopped: what was measured until then is above and in the JSON file, if there is one.\n";
+}
+
+void measure_as_child(const Options& options) {
+  replay::catch_first_interrupt();
+  const Input input = open_inputs(options).front();
+  std::cout << (options.child == "start" ? child_start(input) : child_memory(options, input)) << "\n";
+}
+
+}  // namespace
+}  // namespace frontier_surfels::bench
+
+int main(int argc, char** argv) {
+  using namespace frontier_surfels::bench;
+  try {
+    const Options options = parse(argc, argv);
+    options.child.empty() ? measure(options) : measure_as_child(options);
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return kDone;
+    std::cerr << "bench: " << error.what() << "\n";
+    return kWrongUsage;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "bench: out of memory: leave map_size out (--only), or take fewer frames (--frames).\n";
+  } catch (const std::exception& error) {
+    std::cerr << "bench: " << error.what() << "\n";
+  }
+  return kFailed;
+}

@@ -1,0 +1,43 @@
+/// What is mapped: a recording, or a synthetic room.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bench/options.hpp"
+#include "frontier_surfels/replay/frame_source.hpp"
+
+namespace frontier_surfels::bench {
+
+/// An input that is read from its beginning as often as it is asked for.
+class Input {
+ public:
+  /// @param path    of a bag or folder; empty: the synthetic room
+  /// @throws Error  it cannot be read, or has no usable frame
+  Input(const std::string& path, const Options& options);
+
+  const std::string& path() const { return path_; }
+  const std::string& name() const { return name_; }
+
+  /// @param frames  so many, taken evenly over all that the options ask for; 0: all of these
+  std::unique_ptr<replay::FrameSource> open(int frames = 0) const;
+
+  /// The base configuration, with the decimation that gives images about so wide.
+  Config config(int width) const;
+
+  /// Of the images after decimation.
+  int width(const Config& config) const { return camera_.width / config.decimation; }
+  int height(const Config& config) const { return camera_.height / config.decimation; }
+
+ private:
+  std::string path_, name_;
+  replay::SourceOptions selection_;
+  int synthetic_frames_ = 0;
+  Intrinsics camera_;  ///< of the images as recorded
+  Config base_;
+};
+
+std::vector<Input> open_inputs(const Options& options);
+
+}  // namespace frontier_surfels::bench

@@ -1,0 +1,59 @@
+#include "bench/measured_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "replay/interrupt.hpp"
+#include "replay/summary.hpp"
+
+namespace frontier_surfels::bench {
+
+using nlohmann::ordered_json;
+
+replay::Run run_frames(Mapper& mapper, replay::FrameSource& source, const Options& options, const AfterFrame& after_frame) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::duration<double>(options.row_seconds);
+  const auto stop = [&] { return replay::stop_requested() || Clock::now() > end; };
+  const auto nothing = [](const DepthFrame&, replay::FrameRecord&) {};
+  replay::Run run = replay::map_frames(mapper, source, after_frame ? after_frame : nothing, stop);
+  if (run.frames.empty()) throw Error("No frame could be used" + (run.skipped.empty() ? "." : ": " + run.skipped.front()));
+  return run;
+}
+
+ordered_json statistics_json(const std::vector<double>& values) {
+  const replay::TimeStatistics statistics = replay::time_statistics(values);
+  return {{"mean", statistics.mean},
+          {"median", statistics.median},
+          {"p95", statistics.p95},
+          {"max", statistics.max},
+          {"rsd_percent", statistics.rsd_percent}};
+}
+
+void add_figures(const replay::Run& run, ordered_json& row) {
+  const auto warm = replay::warm_frames(run.frames);
+  std::vector<double> cpu_ms;
+  for (const auto& frame : warm) cpu_ms.push_back(frame.cpu_ms);
+  std::size_t working_bytes = 0;
+  for (const auto& frame : run.frames) working_bytes = std::max(working_bytes, frame.report.device_bytes - frame.report.map_bytes);
+  const Report& last = run.frames.back().report;
+  row["device"] = run.device;
+  row["frames"] = run.frames.size();
+  row["complete"] = !run.stopped;
+  row["time_ms"] = replay::time_json(warm, replay::stage_names(run.frames));
+  row["cpu_ms"] = statistics_json(cpu_ms);
+  row["surfels"] = last.surfels;
+  row["map_bytes"] = last.map_bytes;
+  row["working_bytes"] = working_bytes;
+}
+
+void attempt(ordered_json& row, const std::function<void()>& measure) {
+  try {
+    measure();
+  } catch (const std::bad_alloc&) {
+    row["error"] = "Out of memory.";
+  } catch (const std::exception& error) {
+    row["error"] = error.what();
+  }
+}
+
+}  // namespace frontier_surfels::bench

@@ -1,0 +1,107 @@
+/// OctoMap's insertion beside the mapper, frame by frame, so that whatever disturbs the machine disturbs both.
+#include <octomap/octomap.h>
+
+#include <chrono>
+
+#include "bench/measured_run.hpp"
+#include "bench/sections.hpp"
+#include "bench/table.hpp"
+#include "replay/interrupt.hpp"
+#include "replay/summary.hpp"
+#include "scoring/decimated_depth.hpp"
+
+namespace frontier_surfels::bench {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kResolution = 0.01;       // [m]
+constexpr double kQuickResolution = 0.05;  // [m]
+
+struct Times {
+  std::vector<double> wall_ms, cpu_ms;
+};
+
+/// The measured pixels of the mapper's working image, in the world.
+octomap::Pointcloud cloud_of(const DepthFrame& frame, const Config& config) {
+  const auto image = scoring::decimate(frame, {config.z_min, config.z_max, config.decimation});
+  const Intrinsics& camera = image.intrinsics;
+  octomap::Pointcloud cloud;
+  for (int t = 0; t < camera.height; ++t) {
+    for (int s = 0; s < camera.width; ++s) {
+      const double z = image.depth[static_cast<std::size_t>(t) * camera.width + s];
+      if (!(z > 0)) continue;
+      const Eigen::Vector3d p = frame.T_world_camera * Eigen::Vector3d((s - camera.cx) * z / camera.fx, (t - camera.cy) * z / camera.fy, z);
+      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    }
+  }
+  return cloud;
+}
+
+void insert(octomap::OcTree& tree, const DepthFrame& frame, const Config& config, Times& times) {
+  const octomap::Pointcloud cloud = cloud_of(frame, config);
+  const Eigen::Vector3f origin = frame.T_world_camera.translation().cast<float>();
+
+  const auto start = std::chrono::steady_clock::now();
+  const double cpu_before_ms = replay::process_cpu_ms();
+  tree.insertPointCloud(cloud, octomap::point3d(origin.x(), origin.y(), origin.z()), config.z_max);
+  times.cpu_ms.push_back(replay::process_cpu_ms() - cpu_before_ms);
+  times.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+}
+
+/// Of the same frames that the mapper's figures are taken over.
+ordered_json warm_statistics(const std::vector<double>& values, std::size_t warm) {
+  return statistics_json({values.end() - static_cast<std::ptrdiff_t>(warm), values.end()});
+}
+
+ordered_json measure_row(const Options& options, const Input& input) {
+  const Config config = input.config(kUsualWidth);
+  const double resolution = options.quick ? kQuickResolution : kResolution;
+  ordered_json row = {{"input", input.name()}, {"resolution", resolution}, {"z_max", config.z_max}};
+  attempt(row, [&] {
+    // OctoMap takes a second or more a frame, so that few frames are given. Both maps are made of these and of nothing else: a tree that
+    // lacks the frames between is not compared with a map that has them, and both see as much new space in a frame.
+    const auto source = input.open(options.octomap_frames);
+    Mapper mapper(config);
+    octomap::OcTree tree(resolution);
+    Times times;
+    const auto run =
+        run_frames(mapper, *source, options, [&](const DepthFrame& frame, replay::FrameRecord&) { insert(tree, frame, config, times); });
+    add_figures(run, row);
+    const std::size_t warm = replay::warm_frames(run.frames).size();
+    row["octomap"] = {
+        {"time_ms", warm_statistics(times.wall_ms, warm)}, {"cpu_ms", warm_statistics(times.cpu_ms, warm)}, {"bytes", tree.memoryUsage()}};
+    const auto ratio = [&row](const char* time) { return double(row["octomap"][time]["median"]) / double(row[time]["median"]); };
+    row["ratio_time"] = ratio("time_ms");
+    row["ratio_cpu"] = ratio("cpu_ms");
+  });
+  return row;
+}
+
+}  // namespace
+
+ordered_json measure_octomap(const Options& options, const std::vector<Input>& inputs) {
+  ordered_json rows = ordered_json::array();
+  const Table table("OctoMap's insertPointCloud on the same frames, median ms a frame",
+                    {"input", "voxel cm", "frames", "its CPU", "our CPU", "CPU ratio", "its wall", "our wall", "wall ratio"});
+  for (const Input& input : inputs) {
+    if (replay::stop_requested()) break;
+    const ordered_json row = measure_row(options, input);
+    std::vector<std::string> cells = {row["input"], fixed(100 * double(row["resolution"]), 0)};
+    if (row.contains("error")) {
+      cells.push_back(row["error"]);
+    } else {
+      cells.push_back(std::to_string(int(row["frames"])));
+      for (const char* time : {"cpu_ms", "time_ms"}) {
+        cells.push_back(fixed(row["octomap"][time]["median"], 1));
+        cells.push_back(fixed(row[time]["median"], 1));
+        cells.push_back(fixed(row[time == std::string("cpu_ms") ? "ratio_cpu" : "ratio_time"], 1));
+      }
+    }
+    table.row(cells);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace frontier_surfels::bench

@@ -1,0 +1,33 @@
+/// What is measured: a table on standard output, and the same and more as JSON, for each.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "bench/input.hpp"
+#include "bench/options.hpp"
+
+namespace frontier_surfels::bench {
+
+struct Section {
+  const char* name;
+  const char* what;
+  nlohmann::ordered_json (*measure)(const Options& options, const std::vector<Input>& inputs);  ///< rows
+};
+
+/// In the order in which they are measured.
+const std::vector<Section>& sections();
+
+nlohmann::ordered_json measure_frames(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_stages(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_octomap(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_map_size(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_start(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_memory(const Options& options, const std::vector<Input>& inputs);
+
+/// What the processes measure that measure_start() and measure_memory() start: both need one that has done nothing before.
+nlohmann::ordered_json child_start(const Input& input);
+nlohmann::ordered_json child_memory(const Options& options, const Input& input);
+
+}  // namespace frontier_surfels::bench
