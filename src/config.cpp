@@ -81,6 +81,10 @@ std::vector<std::string> Config::problems() const {
   if (z_max <= z_min) {
     faults.push_back("z_max is " + to_text(z_max) + " m, but z_min is " + to_text(z_min) + " m: z_max must be larger.");
   }
+  if (!map_folder.empty() && eviction_radius < 3 * z_max) {
+    faults.push_back("eviction_radius is " + to_text(eviction_radius) + " m: it must be at least three times z_max, which is " +
+                     to_text(z_max) + " m.");
+  }
   if (device_type != "any" && device_type != "cpu" && device_type != "gpu" && device_type != "accelerator") {
     faults.push_back("device_type is '" + device_type + "': it must be any, cpu, gpu or accelerator.");
   }

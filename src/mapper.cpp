@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "frontier_surfels/ply.hpp"
+#include "map_archive.hpp"
 #include "opencl/commands.hpp"
 #include "recent_views.hpp"
 #include "stages.hpp"
@@ -43,7 +44,11 @@ struct Mapper::Impl {
         lists(commands),
         map(commands, lists, config),
         views(commands, config),
-        stages(commands, lists, config, map, views) {}
+        stages(commands, lists, config, map, views) {
+    if (config.map_folder.empty()) return;
+    archive = std::make_unique<MapArchive>(config, map);
+    views.clear(archive->empty());
+  }
 
   Config config;
   Commands commands;
@@ -51,8 +56,10 @@ struct Mapper::Impl {
   SurfelMap map;
   RecentViews views;
   Stages stages;
+  std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
+  bool blocks_moved = false;          ///< to or from the archive, since the last frame
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -74,6 +81,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // The working image and its grid - 3.1, eq. (2)-(3)
   const WorkingImage image = make_working_image(frame, config);
   frame_on_device = 0;
+  if (archive && archive->follow(frame.T_world_camera.translation(), static_cast<std::uint32_t>(report.sequence))) blocks_moved = true;
   stages.begin_frame(image, frame.T_world_camera, static_cast<std::uint32_t>(report.sequence));
 
   // Observed space C~ - 3.3, eq. (9)-(11)
@@ -107,11 +115,14 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
 
   // Labels and colour - 3.5
   stages.label_surfels();
-  stages.finish_frame();
+  const std::vector<BlockKey> emptied = stages.finish_frame();
 
+  if (archive) archive->save_some(emptied, static_cast<std::uint32_t>(report.sequence));
   report.view_kept = views.keep_current();
   report.stages = commands.take_times();
-  sequence = frame_on_device = report.sequence;
+  sequence = report.sequence;
+  frame_on_device = blocks_moved ? 0 : sequence;
+  blocks_moved = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.device_bytes = commands.allocated_bytes();
@@ -138,18 +149,27 @@ Changes Mapper::changes(std::uint64_t since) const {
   return changes;
 }
 
-void Mapper::save(const std::string& path) const { write_ply(path, surfels()); }
+void Mapper::save(const std::string& path) const {
+  std::vector<Surfel> all = surfels();
+  if (impl_->archive) {
+    const std::vector<Surfel> stored = impl_->archive->stored();
+    all.insert(all.end(), stored.begin(), stored.end());
+  }
+  write_ply(path, all);
+}
 
 void Mapper::load(const std::string& path) { load(read_ply(path)); }
 
 void Mapper::load(const std::vector<Surfel>& surfels) {
   on_device([&] { impl_->map.replace(surfels, static_cast<std::uint32_t>(impl_->sequence + 1)); });
+  if (impl_->archive) impl_->archive->clear();
   impl_->views.clear(impl_->map.size() == 0);
   ++impl_->sequence;
 }
 
 void Mapper::reset() {
   on_device([&] { impl_->map.replace({}, static_cast<std::uint32_t>(impl_->sequence + 1)); });
+  if (impl_->archive) impl_->archive->clear();
   impl_->views.clear(true);
   ++impl_->sequence;
 }

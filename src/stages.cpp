@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kGroup = 64;       // work items of a group, where kernels do not say otherwise
 constexpr std::size_t kGroupOfPage = 8;  // of kernels whose work items do eight surfels each
-constexpr double kHullReach = 2;    // times z_max: surfels further from the grid say nothing of the paths that enter it
+constexpr double kHullReach = 2;         // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
   Limits limits = {};
@@ -271,6 +271,6 @@ void Stages::label_surfels() {
                 map_.surfels(), map_.changed());
 }
 
-void Stages::finish_frame() { map_.finish_frame("labels", frame_); }
+std::vector<BlockKey> Stages::finish_frame() { return map_.finish_frame("labels", frame_); }
 
 }  // namespace frontier_surfels

@@ -39,7 +39,7 @@ class Stages {
   std::size_t create_surfels();  ///< @return how many
   void label_surfels();
 
-  void finish_frame();  ///< notes what has changed in the map
+  std::vector<BlockKey> finish_frame();  ///< notes what has changed in the map. @return blocks that have become empty
 
  private:
   friend class StagesProbe;  // tests read and write the fields between stages

@@ -155,15 +155,21 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   list_window();
 }
 
-void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
+std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
   const auto count = static_cast<cl_uint>(window_pages());
   changes_.resize(count + 1);
   empty_.resize(count + 1);
   commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changes_(),
                 empty_());
   const std::vector<cl_uchar> empty = empty_.read(count);
-  for (cl_uint n = 0; n < count; ++n)
-    if (empty[n]) index_.remove_page(window_.block(static_cast<int>(page_cells_[n])), window_pages_[n]);
+  std::vector<BlockKey> emptied;
+  for (cl_uint n = 0; n < count; ++n) {
+    if (!empty[n]) continue;
+    const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
+    index_.remove_page(block, window_pages_[n]);
+    if (index_.find(block) == nullptr) emptied.push_back(block);
+  }
+  return emptied;
 }
 
 Changes SurfelMap::last_changes() {
@@ -274,6 +280,67 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   size_ = surfels.size();
   largest_radius_ = largest;
   return slots;
+}
+
+std::vector<BlockKey> SurfelMap::blocks_changed_since(std::uint32_t frame) const {
+  const auto blocks = page_block_.read(index_.end());
+  std::vector<BlockKey> changed;
+  for (const auto& [block, pages] : index_.blocks()) {
+    const auto is_newer = [&](Page page) { return static_cast<std::uint32_t>(blocks[page].s[3]) > frame; };
+    if (std::any_of(pages.begin(), pages.end(), is_newer)) changed.push_back(block);
+  }
+  std::sort(changed.begin(), changed.end());
+  return changed;
+}
+
+std::vector<StoredBlock> SurfelMap::read_blocks(const std::vector<BlockKey>& blocks) const {
+  std::vector<StoredBlock> stored;
+  std::vector<Page> pages;
+  std::vector<std::size_t> owners;  // of the pages
+  for (const BlockKey& block : blocks) {
+    const BlockIndex::Pages* some = index_.find(block);
+    if (some != nullptr) {
+      pages.insert(pages.end(), some->begin(), some->end());
+      owners.resize(pages.size(), stored.size());
+    }
+    stored.push_back({block, {}});
+  }
+  auto owner = owners.begin();
+  visit(pages, [&](Page, const cl_int4&, cl_ulong alive, const cl_uint4* surfels) {
+    std::vector<std::uint8_t>& bytes = stored[*owner++].second;
+    for_each_bit(alive, [&](std::uint32_t n) {
+      const auto* begin = reinterpret_cast<const std::uint8_t*>(&surfels[n]);
+      bytes.insert(bytes.end(), begin, begin + sizeof(cl_uint4));
+    });
+  });
+  return stored;
+}
+
+void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>& bytes, std::uint32_t frame) {
+  const std::vector<cl_uint4> surfels = to_surfels(bytes);
+  const std::size_t pages = (surfels.size() + PAGE_SLOTS - 1) / PAGE_SLOTS;
+  grow(index_.end() + pages);
+  for (std::size_t n = 0; n < pages; ++n) {
+    const auto begin = surfels.begin() + PAGE_SLOTS * n;
+    const std::vector<cl_uint4> some(begin, std::min(begin + PAGE_SLOTS, surfels.end()));
+    const Page page = index_.add_page(block);
+    surfels_.write(some, PAGE_SLOTS * page);
+    alive_.write({some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1}, page);
+    page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
+  }
+  size_ += surfels.size();
+  for (const cl_uint4& packed : surfels) largest_radius_ = std::max<double>(largest_radius_, unpack(packed, block, block_size_).radius);
+}
+
+void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
+  const BlockIndex::Pages* found = index_.find(block);
+  if (found == nullptr) return;
+  for (const Page page : BlockIndex::Pages(*found)) {
+    size_ -= static_cast<std::size_t>(__builtin_popcountll(alive_.read_one(page)));
+    alive_.write({0}, page);
+    page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
+    index_.remove_page(block, page);
+  }
 }
 
 std::size_t SurfelMap::bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() + index_.bytes(); }

@@ -10,6 +10,7 @@
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 #include "lists.hpp"
+#include "map_database.hpp"
 #include "map_window.hpp"
 #include "opencl/commands.hpp"
 
@@ -44,8 +45,8 @@ class SurfelMap {
   /// Accounts for surfels that a kernel has removed.
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Notes which pages the frame has changed, and frees empty ones.
-  void finish_frame(const char* stage, std::uint32_t frame);
+  /// Notes which pages the frame has changed, and frees empty ones. @return blocks that have none left
+  std::vector<BlockKey> finish_frame(const char* stage, std::uint32_t frame);
 
   /// What the last frame has changed. Only until the next one begins.
   Changes last_changes();
@@ -59,6 +60,16 @@ class SurfelMap {
 
   /// Replaces everything, as frame `frame`. Gives every block pages in the order in which its surfels come. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
+
+  /// @name Whole blocks, for the archive. Blocks of the window must not come or go during a frame.
+  /// @{
+  double block_size() const { return block_size_; }  ///< [m]
+  const BlockIndex& index() const { return index_; }
+  std::vector<BlockKey> blocks_changed_since(std::uint32_t frame) const;  ///< sorted
+  std::vector<StoredBlock> read_blocks(const std::vector<BlockKey>& blocks) const;
+  void add_block(const BlockKey& block, const std::vector<std::uint8_t>& bytes, std::uint32_t frame);
+  void drop_block(const BlockKey& block, std::uint32_t frame);
+  /// @}
 
   const cl::Buffer& surfels() const { return surfels_(); }
   const cl::Buffer& alive() const { return alive_(); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "0_shared.h"
 
@@ -65,6 +66,19 @@ Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) 
   surfel.label = attributes & SURFEL_OCCUPIED ? Label::kOccupied : Label::kFrontier;
   for (int channel = 0; channel < 3; ++channel) surfel.rgb[channel] = static_cast<std::uint8_t>(attributes >> (8 * channel));
   return surfel;
+}
+
+std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes) {
+  if (bytes.size() % sizeof(cl_uint4) != 0) throw FileError("A block in the map folder is not whole: the folder is damaged.");
+  std::vector<cl_uint4> surfels(bytes.size() / sizeof(cl_uint4));
+  if (!bytes.empty()) std::memcpy(surfels.data(), bytes.data(), bytes.size());
+  return surfels;
+}
+
+std::vector<Surfel> unpack_block(const std::vector<std::uint8_t>& bytes, const BlockKey& block, double block_size) {
+  std::vector<Surfel> surfels;
+  for (const cl_uint4& packed : to_surfels(bytes)) surfels.push_back(unpack(packed, block, block_size));
+  return surfels;
 }
 
 }  // namespace frontier_surfels

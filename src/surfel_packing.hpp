@@ -1,6 +1,8 @@
 /// A surfel in 16 bytes, as kernels/1_surfels.cl packs it.
 #pragma once
 
+#include <vector>
+
 #include "block_key.hpp"
 #include "frontier_surfels/types.hpp"
 #include "opencl/opencl.hpp"
@@ -13,5 +15,9 @@ BlockKey block_of(const Eigen::Vector3f& position, double block_size);
 cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size);
 
 Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size);
+
+/// The surfels of a block one after the other, 16 bytes each. @throws FileError  they are not whole
+std::vector<Surfel> unpack_block(const std::vector<std::uint8_t>& bytes, const BlockKey& block, double block_size);
+std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes);
 
 }  // namespace frontier_surfels

@@ -42,6 +42,10 @@ struct Config {
   bool refine_surfels = true;
   double surface_depth = 0.03;
 
+  // Maps larger than memory (ours)
+  std::string map_folder;
+  double eviction_radius = 20;
+
   /// Every fault, one sentence each; empty when the configuration can be used.
   std::vector<std::string> problems() const;
 };
@@ -91,6 +95,12 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   visit(
       FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1},
       config.surface_depth);
+
+  visit(FieldInfo{"map_folder", "", "folder that keeps the map on disk, and what is far from the camera only there; empty: none"},
+        config.map_folder);
+  visit(FieldInfo{"eviction_radius", "m", "with a map_folder: blocks of the map further from the camera, along an axis, leave memory", 1,
+                  1e6},
+        config.eviction_radius);
 }
 
 /// Reads a flat YAML map of fields over the defaults. Values out of range are left to problems().
