@@ -17,6 +17,17 @@ namespace frontier_surfels {
 #define TILE_J 8
 #define TILE_K 32
 
+// Tile of the grid that has one list of the recent views that may know something there. VIEW_TILE_K is a quarter of a word.
+#define VIEW_TILE 8
+#define VIEW_TILE_K 16
+
+// Side of the blocks of a view's image whose largest depth is known [pixel].
+#define VIEW_BLOCK 8
+
+// So many candidates, or views, one work item handles at once, as vectors of 16; and the numbers that a view then has.
+#define LANES 16
+#define VIEW_LANE_FIELDS 18
+
 // Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels.
 #define SIGN_FIELD_ONE 256
 
@@ -77,13 +88,13 @@ typedef struct {
   float block_size;                         // edge of a block, a power of two [m]
 } Window;
 
-// A kept view: where it was and where its depths start in the pool.
+// A kept view: where it was and where its depths, and the largest depths of its blocks, start in their pools.
 typedef struct {
   Transform T_camera_world;
   float fx, fy, cx, cy;
   SHARED_INT width, height;
   SHARED_UINT first_pixel;
-  SHARED_UINT padding;
+  SHARED_UINT first_block;
 } View;
 
 // A surfel as the view's grid sees it.

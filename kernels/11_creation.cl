@@ -1,83 +1,150 @@
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
-// New surfel filter. One work item a word: candidates that are known, or whose directions cancel, make no surfel.
-//   in  observed: C~;  known: K~;   i/o candidates
-__kernel void filter_candidates(const Grid g, const Limits limits, __global const float* layer_depth, __global const ulong* observed,
-                                __global const ulong* known, __global ulong* candidates) {
-  const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k) return;
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
-  ulong kept = candidates[word] & ~known[word];
-  for (ulong left = kept; left != 0; left &= left - 1) {
-    const int bit = lowest_bit(left);
-    if (length(observed_direction(&g, layer_depth, observed, (int3)(i, j, 64 * w + bit))) < limits.normal_min) kept &= ~(1ul << bit);
-  }
-  candidates[word] = kept;
+// New surfel filter. One work item a listed candidate: those that are known, or whose directions cancel, make no surfel.
+//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left;  known: K~
+//   out kept[count]: 1 or 0
+__kernel void filter_candidates(const Limits limits, __global const int* voxels, const int count, __global const float* directions,
+                                __global const ulong* candidates, __global const ulong* known, __global uint* kept) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const int word = voxels[n] / 64, bit = voxels[n] % 64;
+  __global const float* direction = directions + n / LANES * 3 * LANES + n % LANES;
+  const bool has_normal = length((float3)(direction[0], direction[LANES], direction[2 * LANES])) >= limits.normal_min;
+  kept[n] = has_normal && ((candidates[word] & ~known[word]) >> bit & 1) != 0 ? 1 : 0;
 }
 
-// Normal of a new surfel: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
+// One work item a listed candidate.
+//   in  offsets[count + 1]: prefix sum of filter_candidates' kept;   out created: the numbers of those that are
+__kernel void list_kept(__global const uint* offsets, const int count, __global int* created) {
+  const int n = get_global_id(0);
+  if (n < count && offsets[n + 1] > offsets[n]) created[offsets[n]] = n;
+}
+
+INLINE float16 voxel_sizes(const Grid* g, float16 z) { return fmax(z, g->z_min) / g->f; }
+
+// So far before a surfel, 7/4 of its radius, known space is expected.
+INLINE float16 front_distances(const Grid* g, float16 z) { return 1.75f * 0.8660254f * voxel_sizes(g, z); }
+
+INLINE int16 knows_points(const View* view, __global const float* depths, Points p, int16 asked) {
+  return knows(view, depths, p.x, p.y, p.z, asked);
+}
+
+// Normals of new surfels: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
 // observed voxel nearest to it that does not, and the surfel is ragged.
-float3 surfel_normal(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth,
-                     __global const ulong* observed, int3 v, bool* ragged) {
-  const float3 center = voxel_center(g, layer_depth, v);
-  const float reach = 1.75f * 0.8660254f * voxel_size(g, center.z);
-  const float3 mean = normalize(observed_direction(g, layer_depth, observed, v));
-  *ragged = !view_knows(view, depths, center + reach * mean);
-  if (!*ragged) return mean;
-  float3 best = mean;
-  float best_cosine = -1.0f;
+//   around: the voxels' observed_around
+Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
+                      Points center, Points mean, int16 around, int16 asked, int16* ragged) {
+  const float16 reach = front_distances(g, center.z);
+  *ragged = asked & ~knows_points(view, depths, add_scaled(center, reach, mean), asked);
+  if (lane_bits(*ragged) == 0) return mean;
+  Points best = mean;
+  float16 best_cosine = -1.0f;
   for (int n = 0; n < 27; ++n) {
-    const int3 u = v + (int3)(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    if (!inside_grid(g, u) || !test_bit(g, observed, u)) continue;
-    const float3 direction = normalize(voxel_center(g, layer_depth, u) - center);
-    const float cosine = dot(direction, mean);
-    if (cosine > best_cosine && view_knows(view, depths, center + reach * direction)) {
-      best = direction;
-      best_cosine = cosine;
-    }
+    int16 better = *ragged & ((around & 1 << n) != 0);
+    if (lane_bits(better) == 0) continue;
+    const Points u = voxel_centers(g, layer_depth, (Voxels){v.i + n % 3 - 1, v.j + n / 3 % 3 - 1, v.k + n / 9 - 1});
+    const Points direction = normalized((Points){u.x - center.x, u.y - center.y, u.z - center.z});
+    const float16 cosine = direction.x * mean.x + direction.y * mean.y + direction.z * mean.z;
+    better &= cosine > best_cosine;
+    better = knows_points(view, depths, add_scaled(center, reach, direction), better);
+    best.x = better ? direction.x : best.x;
+    best.y = better ? direction.y : best.y;
+    best.z = better ? direction.z : best.z;
+    best_cosine = better ? cosine : best_cosine;
   }
   return best;
 }
 
-// Where in its voxel a surfel stands: slid along its normal until it is near the boundary, in steps of a tenth of a voxel. A step is left
-// in hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
-float3 slide_to_boundary(const Grid* g, const View* view, __global const View* views, int view_count, __global const float* depths, int3 v,
-                         float3 center, float3 normal) {
-  const float size = voxel_size(g, center.z);
-  const float3 step = 0.1f * size * normal, front = 1.75f * 0.8660254f * size * normal;
-  const bool has_front = view_knows(view, depths, center + front);
-  int steps = 0;
-  while (steps < 4) {
-    const float3 next = center + (float)(steps + 1) * step;
-    if (any(voxel_of(to_grid(g, next)) != v) || view_knows(view, depths, next) || view_knows(view, depths, next + step)) break;
-    if (has_front && !view_knows(view, depths, next + front)) break;
-    ++steps;
+INLINE int16 floor_ints(float16 x) {
+  const int16 above = convert_int16(x);
+  return above + (convert_float16(above) > x);
+}
+
+// Are points of the camera's frame in these voxels?
+INLINE int16 in_voxels(const Grid* g, Points p, Voxels v) {
+  const int16 cuboid = p.z < g->z_min;
+  const float16 width = cuboid ? g->z_min : p.z;
+  const float16 k = cuboid ? p.z / g->delta_min + (float)g->padding_k : g->f * natural_log16(p.z / g->z_min) + g->k_min;
+  return (floor_ints(p.x * g->fx / width + g->center_i + 0.5f) == v.i) & (floor_ints(p.y * g->fy / width + g->center_j + 0.5f) == v.j) &
+         (floor_ints(k + 0.5f) == v.k);
+}
+
+// Where in their voxels surfels stand: slid along their normals until they are near the boundary, in steps of a tenth of a voxel. A step
+// is left in hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
+Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* around, __global const float* depths, Voxels v, Points center,
+                         Points normal, int16 asked) {
+  const float16 step = 0.1f * voxel_sizes(g, center.z), front = front_distances(g, center.z);
+  const Points forward = {step * normal.x, step * normal.y, step * normal.z};
+  const Points ahead = {front * normal.x, front * normal.y, front * normal.z};
+  const int16 has_front = knows_points(view, depths, add_scaled(center, 1.0f, ahead), asked);
+  int16 moving = asked, steps = 0;
+  for (int n = 1; n <= 4 && lane_bits(moving) != 0; ++n) {
+    const Points next = add_scaled(center, (float)n, forward);
+    moving &= in_voxels(g, next, v);
+    moving &= ~knows_points(view, depths, next, moving);
+    moving &= ~knows_points(view, depths, add_scaled(next, 1.0f, forward), moving);
+    moving &= ~has_front | knows_points(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
+    steps -= moving;
   }
-  while (steps > 0 && (any_view_knows(views, view_count, depths, center + (float)(steps + 1) * step) ||
-                       any_view_knows(views, view_count, depths, center + (float)steps * step)))
-    --steps;
-  return center + (float)steps * step;
+  int16 open = asked & (steps > 0);
+  while (lane_bits(open) != 0) {
+    int16 known = any_view_knows(around, depths, add_scaled(center, convert_float16(steps + 1), forward), open);
+    known |= any_view_knows(around, depths, add_scaled(center, convert_float16(steps), forward), open & ~known);
+    steps += known;
+    open = known & (steps > 0);
+  }
+  return add_scaled(center, convert_float16(steps), forward);
+}
+
+// One work item a chunk of LANES new surfels.
+//   in  created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
+//       refine: whether they leave their voxel's centre and mean normal
+//       view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of settle_candidates;  depths: their images
+//   out placed[LANES chunks]: centre, camera frame, and radius [m];  normals[LANES chunks]: camera frame, and attributes as bits
+__kernel void shape_surfels(const Grid g, const Limits limits, const int refine, const View view, __global const View* views,
+                            __global const ushort* tile_views, const int view_groups, __global const float* depths,
+                            __global const float* layer_depth, __global const int* created, const int count, __global const int* voxels,
+                            __global const int* around, __global const float* directions, __global float4* placed,
+                            __global float4* normals) {
+  const int chunk = get_global_id(0);
+  if (chunk * LANES >= count) return;
+  int16 exist, ragged = 0;
+  const int16 numbers = load_chunk(created, count, chunk, &exist);
+  const Voxels v = voxels_of(&g, gather_int(voxels, numbers));
+  const Points center = voxel_centers(&g, layer_depth, v);
+  const int16 at = numbers / LANES * 3 * LANES + numbers % LANES;
+  Points p = center;
+  Points normal = normalized((Points){gather(directions, at), gather(directions, at + LANES), gather(directions, at + 2 * LANES)});
+  if (refine) {
+    const ViewsAround near = views_around(&g, views, tile_views, view_groups, v);
+    normal = surfel_normals(&g, &view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist, &ragged);
+    p = slide_to_boundary(&g, &view, &near, depths, v, center, normal, exist);
+  }
+  float shaped[8][LANES];
+  vstore16(p.x, 0, shaped[0]);
+  vstore16(p.y, 0, shaped[1]);
+  vstore16(p.z, 0, shaped[2]);
+  vstore16(limits.create_radius * voxel_sizes(&g, center.z), 0, shaped[3]);
+  vstore16(normal.x, 0, shaped[4]);
+  vstore16(normal.y, 0, shaped[5]);
+  vstore16(normal.z, 0, shaped[6]);
+  vstore16(as_float16(ragged ? (int16)(SURFEL_RAGGED) : 0), 0, shaped[7]);
+  for (int n = 0; n < LANES; ++n) {
+    placed[chunk * LANES + n] = (float4)(shaped[0][n], shaped[1][n], shaped[2][n], shaped[3][n]);
+    normals[chunk * LANES + n] = (float4)(shaped[4][n], shaped[5][n], shaped[6][n], shaped[7][n]);
+  }
 }
 
 // One work item a new surfel.
-//   in  voxels[count]: 64 word + bit of each candidate;  refine: whether they leave their voxel's centre and mean normal
-//       view: this frame's, views[view_count]: the kept ones, both in this frame's camera;  depths: their images
+//   in  placed[count], normals[count]: of shape_surfels
 //   out new_surfels, new_cells: for the map
-__kernel void create_surfels(const Grid g, const Limits limits, const Window window, const Transform T_local_camera, const int refine,
-                             const View view, __global const View* views, const int view_count, __global const float* depths,
-                             __global const float* layer_depth, __global const ulong* observed, __global const uint* voxels,
-                             const uint count, __global uint4* new_surfels, __global uint* new_cells) {
+__kernel void create_surfels(const Window window, const Transform T_local_camera, __global const float4* placed,
+                             __global const float4* normals, const uint count, __global uint4* new_surfels, __global uint* new_cells) {
   const uint n = get_global_id(0);
   if (n >= count) return;
-  const int word = voxels[n] / 64, i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
-  const int3 v = (int3)(i, j, 64 * w + voxels[n] % 64);
-  const float3 p = voxel_center(&g, layer_depth, v);
-  bool ragged = false;
-  const float3 normal = refine ? surfel_normal(&g, &view, depths, layer_depth, observed, v, &ragged)
-                               : normalize(observed_direction(&g, layer_depth, observed, v));
-  const float3 placed = refine ? slide_to_boundary(&g, &view, views, view_count, depths, v, p, normal) : p;
+  const float4 p = placed[n], normal = normals[n];
   uint cell;
-  new_surfels[n] = pack_surfel(&window, transform_point(&T_local_camera, placed), limits.create_radius * voxel_size(&g, p.z),
-                               rotate(&T_local_camera, normal), ragged ? SURFEL_RAGGED : 0, &cell);
+  new_surfels[n] =
+      pack_surfel(&window, transform_point(&T_local_camera, p.xyz), p.w, rotate(&T_local_camera, normal.xyz), as_uint(normal.w), &cell);
   new_cells[n] = cell;
 }

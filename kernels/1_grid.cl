@@ -33,6 +33,7 @@ INLINE int8 floor_int8(float8 x) {
   }
 DEFINE_NATURAL_LOG(natural_log, float, as_int, as_float, (float))
 DEFINE_NATURAL_LOG(natural_log8, float8, as_int8, as_float8, convert_float8)
+DEFINE_NATURAL_LOG(natural_log16, float16, as_int16, as_float16, convert_float16)
 
 // F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.
 INLINE float3 to_grid(const Grid* g, float3 p) {

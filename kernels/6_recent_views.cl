@@ -1,83 +1,256 @@
 // Recent views: our addition to the paper. A candidate whose centre a kept view has seen is known: no surfel there.
 
-// Are both ends of a segment outside the image, or behind it, on the same side? Then all of it is.
-INLINE bool segment_outside(const View* view, float3 a, float3 b) {
-  if (a.z <= 0.0f && b.z <= 0.0f) return true;
-  const float left = view->cx + 0.5f, right = (float)view->width - 0.5f - view->cx;
-  const float top = view->cy + 0.5f, bottom = (float)view->height - 0.5f - view->cy;
-  return (a.x * view->fx < -left * a.z && b.x * view->fx < -left * b.z) || (a.x * view->fx > right * a.z && b.x * view->fx > right * b.z) ||
-         (a.y * view->fy < -top * a.z && b.y * view->fy < -top * b.z) || (a.y * view->fy > bottom * a.z && b.y * view->fy > bottom * b.z);
+// A box of the camera's frame.
+typedef struct {
+  float3 center, half_size;
+} Box;
+
+// All points at most `margin` from the centres of a tile's voxels, of its layers first ... last.
+INLINE Box tile_box(const Grid* g, __global const float* layer_depth, int tile_i, int tile_j, int first, int last, float min_gap) {
+  const float z_first = layer_depth[first], z_last = layer_depth[last];
+  const float wide_first = fmax(z_first, g->z_min), wide_last = fmax(z_last, g->z_min);  // the cuboid's columns are parallel
+  const float left = (float)(tile_i * VIEW_TILE) - g->center_i, right = left + (float)(VIEW_TILE - 1);
+  const float top = (float)(tile_j * VIEW_TILE) - g->center_j, bottom = top + (float)(VIEW_TILE - 1);
+  const float3 low = (float3)(fmin(left * wide_first, left * wide_last) / g->fx, fmin(top * wide_first, top * wide_last) / g->fy, z_first);
+  const float3 high =
+      (float3)(fmax(right * wide_first, right * wide_last) / g->fx, fmax(bottom * wide_first, bottom * wide_last) / g->fy, z_last);
+  // Points behind a candidate are asked for, and those half a voxel around it that it may slide to.
+  const float margin = fmax(min_gap, 0.55f * voxel_size(g, z_last));
+  return (Box){0.5f * (low + high), 0.5f * (high - low) + margin};
 }
 
-// One work item a word. Its voxels' centres lie on one line a + z b, in the camera's frame and in every view's.
-//   in  views[view_count]: T_camera_world is from this frame's camera to the view's;  depths: their images;  layer_depth[size_k]
-//   i/o candidates: those that a view knows are cleared
-__kernel void settle_candidates(const Grid g, __global const View* views, const int view_count, __global const float* depths,
-                                __global const float* layer_depth, __global ulong* candidates) {
-  const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k) return;
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
-  // A word may hold layers of both parts of the grid.
-  const ulong cuboid = bit_run(0, g.first_pyramid_layer - 64 * w);
-  for (int part = 0; part < 2; ++part) {
-    const bool pyramid = part == 1;
-    ulong open = candidates[word] & (pyramid ? ~cuboid : cuboid);
-    if (open == 0) continue;
-    const float2 c = (float2)((float)i - g.center_i, (float)j - g.center_j);
-    const float3 direction = pyramid ? (float3)(c.x / g.fx, c.y / g.fy, 1.0f) : (float3)(0.0f, 0.0f, 1.0f);
-    const float3 base = pyramid ? (float3)(0.0f) : (float3)(c.x * g.z_min / g.fx, c.y * g.z_min / g.fy, 0.0f);
-    ulong settled = 0;
-    for (int v = 0; v < view_count && open != 0; ++v) {
-      const View view = views[v];
-      const float3 a = transform_point(&view.T_camera_world, base), b = rotate(&view.T_camera_world, direction);
-      const float z_first = layer_depth[64 * w + lowest_bit(open)], z_last = layer_depth[64 * w + highest_bit(open)];
-      if (segment_outside(&view, a + z_first * b, a + z_last * b)) continue;
-      ulong known = 0;
-      for (ulong left = open; left != 0; left &= left - 1) {
-        const int bit = lowest_bit(left);
-        if (view_knows(&view, depths, a + layer_depth[64 * w + bit] * b)) known |= 1ul << bit;
-      }
-      open &= ~known;
-      settled |= known;
-    }
-    candidates[word] &= ~settled;
-  }
+// A box as LANES views see it: in their frames, with what float may be wrong by added.
+typedef struct {
+  float16 x, y, z, half_x, half_y, half_z;
+} BoxInViews;
+
+INLINE BoxInViews box_in_views(__global const float* lanes, const Box* box) {
+  const float16 r00 = vload16(0, lanes), r01 = vload16(1, lanes), r02 = vload16(2, lanes);
+  const float16 r10 = vload16(3, lanes), r11 = vload16(4, lanes), r12 = vload16(5, lanes);
+  const float16 r20 = vload16(6, lanes), r21 = vload16(7, lanes), r22 = vload16(8, lanes);
+  const float16 t0 = vload16(9, lanes), t1 = vload16(10, lanes), t2 = vload16(11, lanes);
+  const float3 c = box->center, h = box->half_size;
+  const float16 slack = 1e-5f * (fabs(t0) + fabs(t1) + fabs(t2) + fabs(c.x) + fabs(c.y) + fabs(c.z) + h.x + h.y + h.z);
+  BoxInViews b;
+  b.x = r00 * c.x + r01 * c.y + r02 * c.z + t0;
+  b.y = r10 * c.x + r11 * c.y + r12 * c.z + t1;
+  b.z = r20 * c.x + r21 * c.y + r22 * c.z + t2;
+  b.half_x = fabs(r00) * h.x + fabs(r01) * h.y + fabs(r02) * h.z + slack;
+  b.half_y = fabs(r10) * h.x + fabs(r11) * h.y + fabs(r12) * h.z + slack;
+  b.half_z = fabs(r20) * h.x + fabs(r21) * h.y + fabs(r22) * h.z + slack;
+  return b;
 }
 
-// Does this view, or a kept one, know a point of this frame's camera?
-INLINE bool any_view_knows(__global const View* views, int view_count, __global const float* depths, float3 p) {
-  for (int n = 0; n < view_count; ++n) {
+// Is any point with |x - c| <= h and so on on the side x + slope z >= 0 of a plane through the view's centre?
+INLINE int16 reaches_side(float16 x, float16 half_x, float16 z, float16 half_z, float16 slope) {
+  return x + half_x + slope * z + fabs(slope) * half_z >= 0.0f;
+}
+
+// Does a view know nothing in a rectangle of its image at the depth `near` or beyond?
+INLINE bool is_hidden(const View* view, __global const float* block_depths, int4 pixels, float near) {
+  const int columns = (view->width + VIEW_BLOCK - 1) / VIEW_BLOCK;
+  const int4 blocks = pixels / VIEW_BLOCK;
+  for (int t = blocks.y; t <= blocks.w; ++t)
+    for (int s = blocks.x; s <= blocks.z; ++s)
+      if (block_depths[view->first_block + t * columns + s] > near) return false;
+  return true;
+}
+
+// Which of a group of LANES views may know a point of a box, a bit each. The others certainly know none: the box is outside of their
+// image, or behind all that they have seen there.
+uint views_of_box(__global const float* lanes, __global const View* views, __global const float* block_depths, const Box* box) {
+  const BoxInViews b = box_in_views(lanes, box);
+  const float16 fx = vload16(12, lanes), fy = vload16(13, lanes), cx = vload16(14, lanes) + 0.5f, cy = vload16(15, lanes) + 0.5f;
+  const float16 width = vload16(16, lanes), height = vload16(17, lanes);
+  const float16 slack_x = 0.01f + 1e-5f * (fabs(cx) + width), slack_y = 0.01f + 1e-5f * (fabs(cy) + height);  // [pixel]
+  const float16 near = b.z - b.half_z, far = b.z + b.half_z;
+  const int16 visible = (width > 0.0f) & (far > 0.0f) & reaches_side(fx * b.x, fx * b.half_x, b.z, b.half_z, cx + slack_x) &
+                        reaches_side(-fx * b.x, fx * b.half_x, b.z, b.half_z, width - cx + slack_x) &
+                        reaches_side(fy * b.y, fy * b.half_y, b.z, b.half_z, cy + slack_y) &
+                        reaches_side(-fy * b.y, fy * b.half_y, b.z, b.half_z, height - cy + slack_y);
+  uint bits = lane_bits(visible);
+  if (bits == 0) return 0;
+
+  const int16 in_front = near > 0.01f;
+  const float16 by_near = fx / near, by_far = fx / far, scale = fy / fx;
+  const float16 left = b.x - b.half_x, right = b.x + b.half_x, top = b.y - b.half_y, bottom = b.y + b.half_y;
+  int first_s[LANES], last_s[LANES], first_t[LANES], last_t[LANES];
+  float nearest[LANES];
+  vstore16(convert_int16(clamp(fmin(left * by_near, left * by_far) + cx - slack_x, 0.0f, width - 1.0f)), 0, first_s);
+  vstore16(convert_int16(clamp(fmax(right * by_near, right * by_far) + cx + slack_x, 0.0f, width - 1.0f)), 0, last_s);
+  vstore16(convert_int16(clamp(fmin(top * by_near, top * by_far) * scale + cy - slack_y, 0.0f, height - 1.0f)), 0, first_t);
+  vstore16(convert_int16(clamp(fmax(bottom * by_near, bottom * by_far) * scale + cy + slack_y, 0.0f, height - 1.0f)), 0, last_t);
+  vstore16(near, 0, nearest);
+  for (uint left_over = bits & lane_bits(in_front); left_over != 0; left_over &= left_over - 1) {
+    const int n = lowest_lane(left_over);
     const View view = views[n];
-    const float3 q = transform_point(&view.T_camera_world, p);
-    if (q.z > 0.0f && view_knows(&view, depths, q)) return true;
+    if (is_hidden(&view, block_depths, (int4)(first_s[n], first_t[n], last_s[n], last_t[n]), nearest[n])) bits &= ~(1u << n);
   }
-  return false;
+  return bits;
+}
+
+// A tile's candidates: VIEW_TILE_K bits of the word of each of its columns, read as 16-bit numbers.
+INLINE __global ushort* tile_column(const Grid* g, __global ushort* candidates, int3 tile, int column) {
+  const int i = tile.x * VIEW_TILE + column % VIEW_TILE, j = tile.y * VIEW_TILE + column / VIEW_TILE;
+  if (i >= g->size_i || j >= g->size_j) return 0;
+  return candidates + 4 * word_index(g, i, j, tile.z / 4) + tile.z % 4;
+}
+
+// Which of LANES candidates of a tile are known to one of its views. Their centres lie on lines a + z b, in the camera's frame and in
+// every view's.
+//   entries: VIEW_TILE_K column + layer;  asked: -1 where there is one
+int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, int view_groups,
+                   __global const ushort* tile_views, __global const float* depths, int16 entries, int16 asked) {
+  const int16 column = entries / VIEW_TILE_K, k = tile.z * VIEW_TILE_K + entries % VIEW_TILE_K;
+  const float16 c_i = convert_float16(tile.x * VIEW_TILE + column % VIEW_TILE) - g->center_i;
+  const float16 c_j = convert_float16(tile.y * VIEW_TILE + column / VIEW_TILE) - g->center_j;
+  const float16 z = gather(layer_depth, k);
+  const int16 pyramid = k >= g->first_pyramid_layer;
+  const float16 base_x = pyramid ? 0.0f : c_i * g->z_min / g->fx, base_y = pyramid ? 0.0f : c_j * g->z_min / g->fy;
+  const float16 ray_x = pyramid ? c_i / g->fx : 0.0f, ray_y = pyramid ? c_j / g->fy : 0.0f;
+  int16 open = asked;
+  for (int group = 0; group < view_groups; ++group) {
+    for (uint left = tile_views[group]; left != 0; left &= left - 1) {
+      const View view = views[group * LANES + lowest_lane(left)];
+      const Transform T = view.T_camera_world;
+      const float16 x = T.r00 * base_x + T.r01 * base_y + T.t0 + z * (T.r00 * ray_x + T.r01 * ray_y + T.r02);
+      const float16 y = T.r10 * base_x + T.r11 * base_y + T.t1 + z * (T.r10 * ray_x + T.r11 * ray_y + T.r12);
+      const float16 q = T.r20 * base_x + T.r21 * base_y + T.t2 + z * (T.r20 * ray_x + T.r21 * ray_y + T.r22);
+      open &= ~knows(&view, depths, x, y, q, open);
+      if (lane_bits(open) == 0) return asked;
+    }
+  }
+  return asked & ~open;
+}
+
+// One work-group a tile of VIEW_TILE x VIEW_TILE columns and VIEW_TILE_K layers.
+//   in  views[view_groups * LANES]: T_camera_world is from this frame's camera to the view's;  view_lanes: the same, by lanes;  depths:
+//       their images;  block_depths: the
+//       largest depth of each block of them;  layer_depth[size_k]
+//   out tile_views[tiles][view_groups]: a bit for each view that may know something near a candidate of the tile
+//   i/o candidates: those that a view knows are cleared
+__kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
+                                const int view_groups, __global const float* depths, __global const float* block_depths,
+                                __global const float* layer_depth, __global ushort* tile_views, __global ushort* candidates) {
+  const int number = get_group_id(0), lane = get_local_id(0), lanes = get_local_size(0);
+  const int tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 4 * g.words_k;
+  const int3 tile = (int3)(number % tiles_i, number / tiles_i / tiles_k, number / tiles_i % tiles_k);
+  __local uint open[VIEW_TILE * VIEW_TILE];  // the layers of each column
+  __local ushort entries[VIEW_TILE * VIEW_TILE * VIEW_TILE_K + LANES];
+  __local uint layers, count;
+  if (lane == 0) layers = count = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int column = lane; column < VIEW_TILE * VIEW_TILE; column += lanes) {
+    __global const ushort* bits = tile_column(&g, candidates, tile, column);
+    open[column] = bits != 0 ? *bits : 0;
+    if (open[column] == 0) continue;
+    atomic_or(&layers, open[column]);
+    uint at = atomic_add(&count, popcount(open[column]));
+    for (uint left = open[column]; left != 0; left &= left - 1) entries[at++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (count == 0) return;
+
+  const Box box = tile_box(&g, layer_depth, tile.x, tile.y, tile.z * VIEW_TILE_K + lowest_lane(layers),
+                           tile.z * VIEW_TILE_K + 31 - (int)clz(layers), min_gap);
+  __global ushort* own_views = tile_views + number * view_groups;
+  for (int group = lane; group < view_groups; group += lanes)
+    own_views[group] = (ushort)views_of_box(view_lanes + group * VIEW_LANE_FIELDS * LANES, views + group * LANES, block_depths, &box);
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+
+  for (uint first = lane * LANES; first < count; first += lanes * LANES) {
+    const int16 chunk = convert_int16(vload16(0, entries + first)), asked = lane_numbers() < (int)(count - first);
+    const int16 settled = find_settled(&g, tile, layer_depth, views, view_groups, own_views, depths, asked ? chunk : 0, asked);
+    for (uint left = lane_bits(settled); left != 0; left &= left - 1) {
+      const int entry = entries[first + lowest_lane(left)];
+      atomic_and(&open[entry / VIEW_TILE_K], ~(1u << entry % VIEW_TILE_K));
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int column = lane; column < VIEW_TILE * VIEW_TILE; column += lanes) {
+    __global ushort* bits = tile_column(&g, candidates, tile, column);
+    if (bits != 0) *bits = (ushort)open[column];
+  }
+}
+
+// The kept views that may know something near LANES candidates: those of the tiles that they are in.
+typedef struct {
+  __global const View* views;
+  __global const ushort* tile_views;
+  int view_groups;
+  int tiles[LANES], tile_count;
+} ViewsAround;
+
+INLINE ViewsAround views_around(const Grid* g, __global const View* views, __global const ushort* tile_views, int view_groups, Voxels v) {
+  ViewsAround around = {views, tile_views, view_groups, {0}, 0};
+  const int tiles_i = (g->size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 4 * g->words_k;
+  int tiles[LANES];
+  vstore16((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
+  for (int n = 0; n < LANES; ++n) {
+    bool is_new = true;
+    for (int m = 0; m < around.tile_count; ++m) is_new = is_new && around.tiles[m] != tiles[n];
+    if (is_new) around.tiles[around.tile_count++] = tiles[n];
+  }
+  return around;
+}
+
+// Which of LANES points of this frame's camera, near candidates, does a kept view know?
+int16 any_view_knows(const ViewsAround* around, __global const float* depths, Points p, int16 asked) {
+  int16 open = asked;
+  for (int group = 0; group < around->view_groups; ++group) {
+    uint left = 0;
+    for (int n = 0; n < around->tile_count; ++n) left |= around->tile_views[around->tiles[n] * around->view_groups + group];
+    for (; left != 0; left &= left - 1) {
+      const View view = around->views[group * LANES + lowest_lane(left)];
+      const Transform T = view.T_camera_world;
+      open &= ~knows(&view, depths, T.r00 * p.x + T.r01 * p.y + T.r02 * p.z + T.t0, T.r10 * p.x + T.r11 * p.y + T.r12 * p.z + T.t1,
+                     T.r20 * p.x + T.r21 * p.y + T.r22 * p.z + T.t2, open);
+      if (lane_bits(open) == 0) return asked;
+    }
+  }
+  return asked & ~open;
+}
+
+// at_surface of 2_observed_space, for voxels' centres at depths z.
+INLINE int16 at_surfaces(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, Voxels v,
+                         float16 z) {
+  const int16 s = v.i - g->padding_i, t = v.j - g->padding_j;
+  const int16 in_image = (s >= 0) & (t >= 0) & (s < g->width) & (t < g->height) & (convert_float16(v.k) > g->k_min);
+  const int16 pixel = in_image ? t * g->width + s : 0;
+  const float16 d = gather(depth, pixel);
+  const int16 ends = (v.k == gather_int(column_end, pixel)) & (v.k > g->first_pyramid_layer);
+  return in_image & (d > 0.0f) & (ends | ((z >= d) & (z <= d + surface_depth)));
 }
 
 // Frontier on a sheet of unknown thinner than min_gap, known on both sides, bounds nothing worth a look: left out. A thin body's surfaces
-// stay. One work item a word.
-//   in  observed: C~;  depth, column_end: of 2_observed_space;  view: this frame's, views[view_count]: the kept ones, both in this
-//       frame's camera;  depths: their images
-//   i/o candidates: those with known space again `min_gap` behind them are cleared
-__kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, const int view_count,
-                         __global const float* depths, __global const float* layer_depth, __global const float* depth,
-                         __global const int* column_end, __global const ulong* observed, __global ulong* candidates) {
-  const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k) return;
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
-  ulong kept = candidates[word];
-  for (ulong left = kept; left != 0; left &= left - 1) {
-    const int bit = lowest_bit(left);
-    const int3 v = (int3)(i, j, 64 * w + bit);
-    const float3 center = voxel_center(&g, layer_depth, v);
-    const int pixel = pixel_of(&g, v);
-    if (pixel >= 0 && at_surface(&g, depth[pixel], column_end[pixel], limits.surface_depth, v.z, center.z)) continue;
-    const float3 direction = observed_direction(&g, layer_depth, observed, v);
-    if (length(direction) < limits.normal_min) continue;
-    const float3 behind = center - limits.min_gap * normalize(direction);
-    if (view_knows(&view, depths, behind) || any_view_knows(views, view_count, depths, behind)) kept &= ~(1ul << bit);
+// stay. One work item a chunk of LANES listed candidates.
+//   in  depth, column_end: of 2_observed_space;  view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of
+//       settle_candidates;  depths: their images;  voxels, directions: of find_directions
+//   i/o candidates: those with known space again `min_gap` behind them are cleared; 32-bit halves
+__kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, __global const ushort* tile_views,
+                         const int view_groups, __global const float* depths, __global const float* layer_depth,
+                         __global const float* depth, __global const int* column_end, __global const int* voxels, const int count,
+                         __global const float* directions, __global uint* candidates) {
+  const int chunk = get_global_id(0);
+  if (chunk * LANES >= count) return;
+  int16 exist;
+  const int16 numbers = load_chunk(voxels, count, chunk, &exist);
+  const Voxels v = voxels_of(&g, numbers);
+  const Points center = voxel_centers(&g, layer_depth, v);
+  const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
+  int16 open = exist & (lengths(direction) >= limits.normal_min) & ~at_surfaces(&g, depth, column_end, limits.surface_depth, v, center.z);
+  const int16 asked = open;
+  if (lane_bits(open) == 0) return;
+  const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
+  open &= ~knows(&view, depths, behind.x, behind.y, behind.z, open);
+  const ViewsAround around = views_around(&g, views, tile_views, view_groups, v);
+  open &= ~any_view_knows(&around, depths, behind, open);
+  int closed[LANES];
+  vstore16(numbers, 0, closed);
+  for (uint left = lane_bits(asked & ~open); left != 0; left &= left - 1) {
+    const int number = closed[lowest_lane(left)];
+    atomic_and(&candidates[number / 32], ~(1u << number % 32));
   }
-  candidates[word] = kept;
 }
 
 // Paths that section 4 must still walk: those through the 27 voxels around a candidate, and their neighbours, which the hull looks at.

@@ -37,6 +37,11 @@ class RecentViews {
 
   const cl::Buffer& views() const { return views_(); }
   const cl::Buffer& depths() const { return depths_(); }
+  /// The views that prepare() has sent once more, LANES together: [view_groups()][VIEW_LANE_FIELDS][LANES], zeros behind the last.
+  const cl::Buffer& view_lanes() const { return view_lanes_(); }
+  std::size_t view_groups() const { return (kept_.size() + LANES - 1) / LANES; }
+  /// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
+  const cl::Buffer& block_depths() const { return block_depths_(); }
   std::size_t count() const { return kept_.size(); }
 
  private:
@@ -50,11 +55,14 @@ class RecentViews {
 
   Config config_;
   std::size_t room_pixels_ = 0;  ///< pixels of the largest image so far
+  std::size_t room_blocks_ = 0;  ///< its blocks, or those of another one that has more
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
   bool complete_;
   DeviceArray<View> views_;
-  DeviceArray<float> depths_;  ///< [recent_views + 1][room_pixels_]: the kept views' images and the current one's
+  DeviceArray<float> view_lanes_;
+  DeviceArray<float> block_depths_;  ///< [recent_views + 1][room_blocks_]: as depths_
+  DeviceArray<float> depths_;        ///< [recent_views + 1][room_pixels_]: the kept views' images and the current one's
 };
 
 }  // namespace frontier_surfels

@@ -25,6 +25,8 @@ Limits make_limits(const Config& config) {
   return limits;
 }
 
+std::size_t chunks(std::size_t count) { return (count + LANES - 1) / LANES; }
+
 bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }
@@ -54,13 +56,20 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       candidates_(commands),
       hull_faces_(commands),
       lines_(commands),
+      tile_views_(commands),
+      listed_voxels_(commands),
+      kept_offsets_(commands),
+      around_(commands),
+      created_(commands),
+      directions_(commands),
+      placed_(commands),
+      placed_normals_(commands),
       in_view_bits_(commands),
       large_bits_(commands),
       removed_bits_(commands),
       in_view_slots_(commands),
       split_slots_(commands),
       split_offsets_(commands),
-      created_voxels_(commands),
       view_surfels_(commands),
       new_surfels_(commands),
       new_cells_(commands),
@@ -182,7 +191,7 @@ void Stages::compute_sign_field() {
   tile_surfels_.resize(std::max<std::size_t>(lists_.scan(stage, tile_begin_, tiles), 1));
   commands_.queue().enqueueCopyBuffer(tile_begin_(), tile_cursor_(), 0, 0, (tiles + 1) * sizeof(cl_uint));
   commands_.run(stage, "fill_tiles", in_view_, kGroup, grid_, limits_, view_surfels_(), count, tile_cursor_(), tile_surfels_());
-  const std::size_t group = commands_.device().is_cpu ? 1 : 64;
+  const std::size_t group = large_group();
   commands_.run(stage, "sign_field", tiles * group, group, grid_, limits_, lines_(), view_surfels_(), tile_begin_(), tile_surfels_(),
                 events_());
 }
@@ -226,25 +235,51 @@ void Stages::find_candidates() {
 void Stages::settle_by_recent_views() {
   const char* stage = "recent_views";
   const int count = views_.prepare();
-  if (count > 0)
-    commands_.run(stage, "settle_candidates", words(), kGroup, grid_, views_.views(), count, views_.depths(), layer_depth_(),
+  if (count > 0) {
+    const auto up = [](int size) { return static_cast<std::size_t>((size + VIEW_TILE - 1) / VIEW_TILE); };
+    const std::size_t tiles = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k * (64 / VIEW_TILE_K);
+    const std::size_t group = large_group();
+    tile_views_.resize(tiles * views_.view_groups());
+    commands_.run(stage, "settle_candidates", tiles * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
+                  static_cast<cl_int>(views_.view_groups()), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(),
                   candidates_());
+  }
+  list_candidates();
+  tile_views_.resize(1);
   if (config_.min_gap > 0)
-    commands_.run(stage, "close_gaps", words(), kGroup, grid_, limits_, own_view(), views_.views(), count, views_.depths(), layer_depth_(),
-                  depth_(), column_end_(), observed_(), candidates_());
+    commands_.run(stage, "close_gaps", chunks(listed_count_), large_group(), grid_, limits_, own_view(), views_.views(), tile_views_(),
+                  static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), depth_(), column_end_(), listed_voxels_(),
+                  static_cast<cl_int>(listed_count_), directions_(), candidates_());
   if (!is_open()) return;
   allocate_paths();
   lines_.fill(stage, 0, line_numbers());
   commands_.run(stage, "mark_lines", words(), kGroup, grid_, candidates_(), lines_());
 }
 
+std::size_t Stages::large_group() const { return commands_.device().is_cpu ? 1 : 64; }
+
+void Stages::list_candidates() {
+  const char* stage = "recent_views";
+  listed_count_ = lists_.list_bits(stage, candidates_, words(), listed_voxels_);
+  around_.resize(chunks(listed_count_) * LANES);
+  directions_.resize(chunks(listed_count_) * 3 * LANES);
+  commands_.run(stage, "find_directions", chunks(listed_count_), large_group(), grid_, layer_depth_(), observed_(), listed_voxels_(),
+                static_cast<cl_int>(listed_count_), around_(), directions_());
+}
+
 void Stages::filter_candidates() {
-  commands_.run("creation", "filter_candidates", words(), kGroup, grid_, limits_, layer_depth_(), observed_(), filtered_(), candidates_());
+  const char* stage = "creation";
+  const auto count = static_cast<cl_int>(listed_count_);
+  kept_offsets_.resize(listed_count_ + 1);
+  commands_.run(stage, "filter_candidates", listed_count_, kGroup, limits_, listed_voxels_(), count, directions_(), candidates_(),
+                filtered_(), kept_offsets_());
+  created_count_ = lists_.scan(stage, kept_offsets_, listed_count_);
+  created_.resize(created_count_);
+  if (created_count_ > 0) commands_.run(stage, "list_kept", listed_count_, kGroup, kept_offsets_(), count, created_());
 }
 
 std::size_t Stages::remove_surfels() {
   const char* stage = "removal";
-  created_count_ = lists_.list_bits("creation", candidates_, words(), created_voxels_);
   map_.reserve(created_count_);
   new_surfels_.resize(created_count_);
   new_cells_.resize(created_count_);
@@ -257,10 +292,13 @@ std::size_t Stages::remove_surfels() {
 
 std::size_t Stages::create_surfels() {
   const char* stage = "creation";
-  commands_.run(stage, "create_surfels", created_count_, kGroup, grid_, limits_, window_, T_local_camera_,
-                static_cast<cl_int>(config_.refine_surfels), own_view(), views_.views(), static_cast<cl_int>(views_.count()),
-                views_.depths(), layer_depth_(), observed_(), created_voxels_(), static_cast<cl_uint>(created_count_), new_surfels_(),
-                new_cells_());
+  placed_.resize(chunks(created_count_) * LANES);
+  placed_normals_.resize(chunks(created_count_) * LANES);
+  commands_.run(stage, "shape_surfels", chunks(created_count_), large_group(), grid_, limits_, static_cast<cl_int>(config_.refine_surfels),
+                own_view(), views_.views(), tile_views_(), static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(),
+                created_(), static_cast<cl_int>(created_count_), listed_voxels_(), around_(), directions_(), placed_(), placed_normals_());
+  commands_.run(stage, "create_surfels", created_count_, kGroup, window_, T_local_camera_, placed_(), placed_normals_(),
+                static_cast<cl_uint>(created_count_), new_surfels_(), new_cells_());
   map_.insert(stage, new_surfels_, new_cells_, created_count_);
   return created_count_;
 }

@@ -50,10 +50,12 @@ class Stages {
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
   void place_surfels();
+  void list_candidates();  ///< and the direction to the observed space around each
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   void allocate_paths();
-  View own_view() const;  ///< this frame's, as the camera itself sees it
+  std::size_t large_group() const;  ///< work items of a group where one item has much to do
+  View own_view() const;            ///< this frame's, as the camera itself sees it
 
   Commands& commands_;
   Lists& lists_;
@@ -70,7 +72,7 @@ class Stages {
   View view_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
-  std::size_t in_view_ = 0, created_count_ = 0;
+  std::size_t in_view_ = 0, listed_count_ = 0, created_count_ = 0;
 
   // Image and grid
   DeviceArray<float> depth_, layer_depth_;
@@ -81,10 +83,17 @@ class Stages {
   // Bit fields
   DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, occupied_voxels_, candidates_;
   DeviceArray<cl_uint> hull_faces_, lines_;
+  DeviceArray<cl_ushort> tile_views_;
+
+  // Candidates as a list, and new surfels
+  DeviceArray<cl_uint> listed_voxels_, kept_offsets_;
+  DeviceArray<cl_int> around_, created_;
+  DeviceArray<float> directions_;
+  DeviceArray<cl_float4> placed_, placed_normals_;
 
   // Surfels in view
   DeviceArray<cl_ulong> in_view_bits_, large_bits_, removed_bits_;
-  DeviceArray<cl_uint> in_view_slots_, split_slots_, split_offsets_, created_voxels_;
+  DeviceArray<cl_uint> in_view_slots_, split_slots_, split_offsets_;
   DeviceArray<ViewSurfel> view_surfels_;
   DeviceArray<cl_uint4> new_surfels_;
   DeviceArray<cl_uint> new_cells_, near_pages_;

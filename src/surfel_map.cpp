@@ -13,7 +13,8 @@ namespace {
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
 constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
-constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead
+constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead; on a CPU as many as there are, which cost
+                                            // nothing until they are touched
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -53,11 +54,11 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
 }
 
 void SurfelMap::grow(std::size_t pages) {
-  const std::size_t kept = index_.end();
-  surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, kSpare);
-  alive_.grow(pages, kept, kSpare);
-  changed_.grow(pages, kept, kSpare);
-  page_block_.grow(pages, kept, kSpare);
+  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
+  surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
+  alive_.grow(pages, kept, spare);
+  changed_.grow(pages, kept, spare);
+  page_block_.grow(pages, kept, spare);
 }
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
@@ -343,6 +344,10 @@ void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   }
 }
 
-std::size_t SurfelMap::bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() + index_.bytes(); }
+std::size_t SurfelMap::bytes() const {
+  if (!commands_.device().is_cpu) return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() + index_.bytes();
+  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + 2 * sizeof(cl_ulong) + sizeof(cl_int4);
+  return kPage * index_.end() + index_.bytes();
+}
 
 }  // namespace frontier_surfels

@@ -25,13 +25,16 @@ void check_filter(const Camera& camera, double observed_density, double known_de
   probe.set_observed(observed);
   probe.set_filtered(known);
   probe.set_candidates(candidates);
+  probe.list_candidates();
   probe.stages().filter_candidates();
   Field<Truth> expected = grid.field(Truth::no);
   for_each_voxel(candidates, [&](int i, int j, int k) {
     if (!candidates(i, j, k) || known(i, j, k)) return;
     expected(i, j, k) = !less(sum_of_directions(grid, observed, Vector3i(i, j, k)).norm(), 0.01, 1e-4);
   });
-  expect_equal("candidates left", expected, probe.candidates());
+  expect_equal("candidates left", expected, probe.created());
+  const std::vector<std::uint32_t> voxels = probe.created_voxels();
+  EXPECT_TRUE(std::is_sorted(voxels.begin(), voxels.end()));
 }
 
 TEST(StageCreation, FilterOfRandomCandidates) {
@@ -59,9 +62,10 @@ TEST(StageCreation, OppositeDirectionsMakeNoSurfel) {
   probe.set_observed(observed);
   probe.set_filtered(Field<char>(probe.grid(), 0));
   probe.set_candidates(candidates);
+  probe.list_candidates();
   probe.stages().filter_candidates();
   candidates(4, 4, 5) = 0;
-  expect_equal("candidates left", candidates, probe.candidates());
+  expect_equal("candidates left", candidates, probe.created());
 }
 
 struct Scene {
@@ -139,13 +143,16 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   scene.observed = random_field(probe.grid(), 0.2, random);
   probe.stages().select_in_view();
   probe.stages().split_surfels();
-  probe.views().prepare();
   Field<char> candidates = random_field(probe.grid(), density, random);
   for_each_voxel(candidates, [&](int i, int j, int k) {
     if (scene.observed(i, j, k) || sum_of_directions(scene.grid, scene.observed, Vector3i(i, j, k)).norm() < 0.05) candidates(i, j, k) = 0;
   });
   probe.set_observed(scene.observed);
   probe.set_candidates(candidates);
+  probe.stages().settle_by_recent_views();
+  probe.stages().assume_unknown();
+  probe.stages().filter_candidates();
+  candidates = probe.created();
   probe.set_removed_bits(std::vector<std::uint64_t>((probe.in_view() + 63) / 64, 0));
   const int words_k = (scene.grid.size_k + 63) / 64;
   for (int j = 0; j < scene.grid.size_j; ++j)

@@ -31,7 +31,7 @@ namespace {
   F(T_camera_world.r12)                                                                                                              \
   F(T_camera_world.r20)                                                                                                              \
   F(T_camera_world.r21) F(T_camera_world.r22) F(T_camera_world.t0) F(T_camera_world.t1) F(T_camera_world.t2) F(fx) F(fy) F(cx) F(cy) \
-      F(width) F(height) F(first_pixel) F(padding)
+      F(width) F(height) F(first_pixel) F(first_block)
 #define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
 #define LIMITS_FIELDS(F) \
   F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(min_gap) F(surface_depth) F(median_votes)

@@ -31,6 +31,7 @@ cl::Program build(const Device& device) {
 Commands::Commands(Device device) : device_(std::move(device)) {
   try {
     queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
+    most_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     std::vector<cl::Kernel> kernels;
     build(device_).createKernels(&kernels);
     for (const auto& kernel : kernels) kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
@@ -52,9 +53,8 @@ std::vector<StageTime> Commands::take_times() {
 }
 
 cl::Buffer Commands::allocate(std::size_t bytes) {
-  const std::size_t most = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
-  if (bytes > most)
-    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " + std::to_string(most >> 20) +
+  if (bytes > most_bytes_)
+    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " + std::to_string(most_bytes_ >> 20) +
                       " MiB; raise decimation, lower z_max or choose another device.");
   cl::Buffer buffer(device_.context, CL_MEM_READ_WRITE, bytes);
   allocated_bytes_ += bytes;

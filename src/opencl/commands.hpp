@@ -1,6 +1,7 @@
 /// The program, its queue, buffers that grow, and the time that each stage took.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <utility>
@@ -40,6 +41,7 @@ class Commands {
   /// Drops the times noted so far.
   void forget_times() { events_.clear(); }
 
+  std::size_t most_bytes() const { return most_bytes_; }  ///< that a buffer may have
   cl::Buffer allocate(std::size_t bytes);
   void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
   std::size_t allocated_bytes() const { return allocated_bytes_; }
@@ -49,7 +51,7 @@ class Commands {
   cl::CommandQueue queue_;
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
-  std::size_t allocated_bytes_ = 0;
+  std::size_t allocated_bytes_ = 0, most_bytes_ = 0;
 };
 
 /// A buffer of T that only ever grows.
@@ -70,7 +72,7 @@ class DeviceArray {
   /// Makes room for `size` elements, with one of `spare` ahead, and keeps the first `kept`.
   void grow(std::size_t size, std::size_t kept, std::size_t spare = 4) {
     if (size <= capacity_) return;
-    const std::size_t larger = size + size / spare;
+    const std::size_t larger = std::max(size, std::min(size + size / spare, commands_->most_bytes() / sizeof(T)));
     const cl::Buffer bigger = commands_->allocate(larger * sizeof(T));
     if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
     commands_->release(capacity_ * sizeof(T));

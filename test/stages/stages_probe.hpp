@@ -184,7 +184,20 @@ class StagesProbe {
     stages_.removed_bits_.resize(bits.size() + 1);
     stages_.removed_bits_.write(bits);
   }
-  std::vector<std::uint32_t> created_voxels() const { return stages_.created_voxels_.read(stages_.created_count_); }
+
+  void list_candidates() { stages_.list_candidates(); }
+  /// Voxels of the new surfels, 64 word + bit each.
+  std::vector<std::uint32_t> created_voxels() const {
+    const std::vector<std::uint32_t> listed = stages_.listed_voxels_.read(stages_.listed_count_);
+    std::vector<std::uint32_t> voxels;
+    for (const int number : stages_.created_.read(stages_.created_count_)) voxels.push_back(listed[number]);
+    return voxels;
+  }
+  Bits created() const {
+    std::vector<std::uint64_t> words(stages_.words(), 0);
+    for (const std::uint32_t voxel : created_voxels()) words[voxel / 64] |= std::uint64_t{1} << voxel % 64;
+    return reference::unpack(words, grid().size_i, grid().size_j, grid().size_k);
+  }
 
   /// @return prefix sums, the total behind them
   std::vector<std::uint32_t> scan(const std::vector<std::uint32_t>& values, std::uint32_t* total) {
