@@ -17,8 +17,8 @@ INLINE uint pack_normal(float3 n) {
 }
 
 INLINE float3 unpack_normal(uint bits) {
-  float3 n = (float3)((float)((int)(bits << 16) >> 16), (float)((int)bits >> 16), 0.0f) / 32767.0f;
-  n.z = 1.0f - fabs(n.x) - fabs(n.y);
+  float3 n = (float3)((float)((int)(bits << 16) >> 16), (float)((int)bits >> 16), 0.0f);  // whole numbers: exact until it is normalised
+  n.z = 32767.0f - fabs(n.x) - fabs(n.y);
   const float fold = fmax(-n.z, 0.0f);
   n.x += n.x < 0.0f ? fold : -fold;
   n.y += n.y < 0.0f ? fold : -fold;

@@ -14,6 +14,7 @@ constexpr std::size_t kGroup = 64;
 constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
 constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
 constexpr std::size_t kSpare = 8;           // one page of so many is allocated ahead
+constexpr double kLargestRadius = 4;  // [block]; what a still larger surfel, of some loaded map, reaches beyond that is not looked for
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -62,11 +63,13 @@ void SurfelMap::grow(std::size_t pages) {
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
   const double coarsest = 1.2 * grid.z_max / grid.f;  // voxel at the far end [m], and some more
-  largest_radius_ = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
+  const double largest = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
   const double slope =
       std::max({grid.center_i, grid.size_i - grid.center_i}) / grid.fx + std::max({grid.center_j, grid.size_j - grid.center_j}) / grid.fy;
-  const double reach = std::max(2 * largest_radius_, thickness_ * coarsest) + 2 * coarsest;
+  const double radius = std::min(largest, std::max(kLargestRadius * block_size_, coarsest));
+  const double reach = std::max(2 * radius, thickness_ * coarsest) + 2 * coarsest;
   window_ = MapWindow(grid, T_world_camera, block_size_, reach * (1 + slope));
+  largest_radius_ = largest;
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
