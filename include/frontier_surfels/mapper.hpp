@@ -44,7 +44,8 @@ class Mapper {
   /// method then trusts those a little more). @throws FileError: the map stays as it was
   void load(const std::string& path);
 
-  /// The same from memory; ids are given anew.
+  /// The same from memory; ids are given anew. Surfels far larger than any that this mapper makes (of 2 m, where z_max is up to 12 m)
+  /// become so small.
   void load(const std::vector<Surfel>& surfels);
 
   /// Forgets everything but the configuration and the sequence number.
