@@ -34,7 +34,8 @@ class Mapper {
   /// The surfels whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
 
-  /// What has changed since the map had sequence number `since` (0: everything).
+  /// What has changed since the map had sequence number `since` (0: everything): the last frame's changes exactly, earlier ones with some
+  /// surfels around that have not changed, and ids that were free already.
   Changes changes(std::uint64_t since) const;
 
   /// Writes the map as a PLY file, to a temporary file first that is then renamed. @throws FileError
