@@ -208,6 +208,8 @@ void expect_as_on_host(const Window& window, const Surfel& surfel, const std::ui
   const cl_uint4 packed = {{out[0], out[1], out[2], out[3]}};
   const Unpacked slow = unpack_slowly(packed, {x, y, z}, window.block_size);
   EXPECT_LT((slow.normal - surfel.normal.cast<double>()).norm(), kNormalStep);
+  EXPECT_LE((slow.position - surfel.position.cast<double>()).cwiseAbs().maxCoeff(), 0.65 * window.block_size / 65536);
+  expect_radius(slow.radius, surfel.radius);
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_EQ(as_float(out[5 + axis]), slow.position[axis]) << "exact";
     EXPECT_NEAR(as_float(out[8 + axis]), slow.normal[axis], 1e-6);
