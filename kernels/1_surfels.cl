@@ -19,8 +19,8 @@ INLINE uint pack_normal(float3 n) {
 }
 
 INLINE float3 unpack_normal(uint bits) {
-  float3 n = (float3)((float)((int)(bits << 16) >> 16), (float)((int)bits >> 16), 0.0f) / 32767.0f;
-  n.z = 1.0f - fabs(n.x) - fabs(n.y);
+  float3 n = (float3)((float)((int)(bits << 16) >> 16), (float)((int)bits >> 16), 0.0f);  // whole numbers: exact until it is normalised
+  n.z = 32767.0f - fabs(n.x) - fabs(n.y);
   const float fold = fmax(-n.z, 0.0f);
   n.x += n.x < 0.0f ? fold : -fold;
   n.y += n.y < 0.0f ? fold : -fold;
@@ -87,8 +87,8 @@ INLINE Surfels8 load_eight(const Window* window, const Transform* T_camera_local
 
 // Their normals, camera frame.
 INLINE void normals_of_eight(const Surfels8* s, const Transform* T_camera_local, float8* x, float8* y, float8* z) {
-  float8 n_x = convert_float8(as_int8(s->normal << 16) >> 16) / 32767.0f, n_y = convert_float8(as_int8(s->normal) >> 16) / 32767.0f;
-  const float8 n_z = 1.0f - fabs(n_x) - fabs(n_y), fold = fmax(-n_z, 0.0f);
+  float8 n_x = convert_float8(as_int8(s->normal << 16) >> 16), n_y = convert_float8(as_int8(s->normal) >> 16);
+  const float8 n_z = 32767.0f - fabs(n_x) - fabs(n_y), fold = fmax(-n_z, 0.0f);
   n_x += select(-fold, fold, n_x < 0.0f);
   n_y += select(-fold, fold, n_y < 0.0f);
   const float8 length = sqrt(n_x * n_x + n_y * n_y + n_z * n_z);

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontier_surfels/types.hpp"
+
 namespace frontier_surfels {
 namespace {
+
+constexpr double kMostCells = 1 << 20;  // a grid of 24 blocks' range and 150 degrees of view has fewer
 
 /// The tangents of the grid's borders, seen from the camera: low and high along i, low and high along j.
 Eigen::Vector4d border_slopes(const Grid& g) {
@@ -38,12 +42,16 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
       for (const double j : {slopes[2], slopes[3]}) box.extend(T_world_camera * Eigen::Vector3d(i * scale, j * scale, z));
   const Eigen::Vector3d low = ((box.min().array() - margin) / block_size).floor(),
                         high = ((box.max().array() + margin) / block_size).floor();
+  const Eigen::Vector3d size = high - low + Eigen::Vector3d::Ones();
+  if (!(size.prod() < kMostCells))
+    throw BadFrame("The view's grid would be " + std::to_string(size.maxCoeff() * block_size) + " m large, too much for a range of " +
+                   std::to_string(grid.z_max) + " m; check the intrinsics.");
   window_.origin_x = static_cast<int>(low.x());
   window_.origin_y = static_cast<int>(low.y());
   window_.origin_z = static_cast<int>(low.z());
-  window_.size_x = static_cast<int>(high.x() - low.x()) + 1;
-  window_.size_y = static_cast<int>(high.y() - low.y()) + 1;
-  window_.size_z = static_cast<int>(high.z() - low.z()) + 1;
+  window_.size_x = static_cast<int>(size.x());
+  window_.size_y = static_cast<int>(size.y());
+  window_.size_z = static_cast<int>(size.z());
   window_.block_size = static_cast<float>(block_size);
   T_camera_local_ = T_world_camera.inverse() * Eigen::Translation3d(low * block_size);
 }

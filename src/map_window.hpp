@@ -13,6 +13,7 @@ class MapWindow {
   MapWindow() = default;
 
   /// @param margin  how far surfels beyond the grid may reach into it [m]
+  /// @throws BadFrame  the grid is absurdly large for its range
   MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin);
 
   const Window& window() const { return window_; }

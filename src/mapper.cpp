@@ -158,7 +158,16 @@ void Mapper::save(const std::string& path) const {
   write_ply(path, all);
 }
 
-void Mapper::load(const std::string& path) { load(read_ply(path)); }
+void Mapper::load(const std::string& path) {
+  const std::vector<Surfel> surfels = read_ply(path);
+  try {
+    load(surfels);
+  } catch (const DeviceError&) {
+    throw;
+  } catch (const Error& error) {
+    throw FileError(path + " cannot be loaded. " + error.what());
+  }
+}
 
 void Mapper::load(const std::vector<Surfel>& surfels) {
   on_device([&] { impl_->map.replace(surfels, static_cast<std::uint32_t>(impl_->sequence + 1)); });

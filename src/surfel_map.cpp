@@ -15,6 +15,7 @@ constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a ti
 constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
 constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead; on a CPU as many as there are, which cost
                                             // nothing until they are touched
+constexpr double kLargestRadius = 4;        // [block]; the window, around all that surfels may reach, must not become large without end
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -63,11 +64,12 @@ void SurfelMap::grow(std::size_t pages) {
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
   const double coarsest = 1.2 * grid.z_max / grid.f;  // voxel at the far end [m], and some more
-  largest_radius_ = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
+  const double largest = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
   const double slope =
       std::max({grid.center_i, grid.size_i - grid.center_i}) / grid.fx + std::max({grid.center_j, grid.size_j - grid.center_j}) / grid.fy;
-  const double reach = std::max(2 * largest_radius_, thickness_ * coarsest) + 2 * coarsest;
+  const double reach = std::max(2 * largest, thickness_ * coarsest) + 2 * coarsest;
   window_ = MapWindow(grid, T_world_camera, block_size_, reach * (1 + slope));
+  largest_radius_ = largest;
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
@@ -251,7 +253,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   std::vector<std::uint32_t> slots;
   double largest = 0;
   for (const Surfel& surfel : surfels) {
-    if (!(surfel.position.cwiseAbs().maxCoeff() < kFarthest))
+    if (!(surfel.position.array().abs() < kFarthest).all())  // nor is it a number
       throw Error("A surfel lies more than 1000 km from the world's origin: this is no map of a robot's surroundings.");
     const BlockKey block = block_of(surfel.position, block_size_);
     const BlockIndex::Pages* pages = index.find(block);
@@ -266,8 +268,10 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
     const auto n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page]));
     alive[page] |= cl_ulong{1} << n;
     slots.push_back(PAGE_SLOTS * page + n);
-    packed[slots.back()] = pack(surfel, block, block_size_);
-    largest = std::max<double>(largest, surfel.radius);
+    Surfel kept = surfel;
+    kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size_));
+    packed[slots.back()] = pack(kept, block, block_size_);
+    largest = std::max<double>(largest, kept.radius);
   }
   grow(std::max(alive.size(), index_.end()));
   // What was there is noted as changed as well.

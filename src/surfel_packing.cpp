@@ -30,9 +30,9 @@ std::uint32_t pack_normal(const Eigen::Vector3f& normal) {
 }
 
 Eigen::Vector3f unpack_normal(std::uint32_t bits) {
-  const auto coordinate = [](std::uint32_t steps) { return static_cast<float>(static_cast<std::int16_t>(steps & 0xffff)) / kNormal; };
-  Eigen::Vector3f n(coordinate(bits), coordinate(bits >> 16), 0);
-  n.z() = 1 - std::abs(n.x()) - std::abs(n.y());
+  const auto coordinate = [](std::uint32_t steps) { return static_cast<float>(static_cast<std::int16_t>(steps & 0xffff)); };
+  Eigen::Vector3f n(coordinate(bits), coordinate(bits >> 16), 0);  // whole numbers: exact until it is normalised
+  n.z() = kNormal - std::abs(n.x()) - std::abs(n.y());
   const float over = std::max(-n.z(), 0.0F);
   n.x() += n.x() < 0 ? over : -over;
   n.y() += n.y() < 0 ? over : -over;

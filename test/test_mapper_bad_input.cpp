@@ -48,6 +48,7 @@ const Fault kFaults[] = {
     {"grey", "colour", [](DepthFrame& f) { f.color->channels = 1; }},
     {"short rows of colour", "colour", [](DepthFrame& f) { f.color->step = 239; }},
     {"zoom without end", "voxels", [](DepthFrame& f) { f.intrinsics.fx = f.intrinsics.fy = 1e7; }},
+    {"view all around", "m large", [](DepthFrame& f) { f.intrinsics.fx = f.intrinsics.fy = 0.5; }},
     {"focal length beyond all", "voxels", [](DepthFrame& f) { f.intrinsics.fx = 1e300; }},
 };
 

@@ -47,7 +47,7 @@ TEST(MapperMemory, RecentViewsTooManyForTheDevice) {
   Mapper mapper(config);
   for (int n = 0; n < 3; ++n) mapper.integrate(frames[n].view());
   const auto before = mapper.surfels();
-  const auto large = plane_frame(plain_camera(1000, 1000, 5), 1);
+  const auto large = plane_frame(plain_camera(600, 600, 40), 1);
   const std::string said = refusal(mapper, large.view());
   if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
   EXPECT_TRUE(contains(said, "MiB")) << said;

@@ -47,10 +47,11 @@ Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, c
 }
 
 /// @return how many surfels lie at surfaces
-std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before, std::uint32_t frame) {
+std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before) {
   std::map<std::uint32_t, Surfel> after, changed;
   for (const Surfel& surfel : probe.map().download()) after[surfel.id] = surfel;
-  for (const Surfel& surfel : probe.map().changes(frame - 1).updated) changed[surfel.id] = surfel;
+  probe.stages().finish_frame();
+  for (const Surfel& surfel : probe.map().last_changes().updated) changed[surfel.id] = surfel;
   EXPECT_EQ(after.size(), before.size());
   const std::vector<float> layer_depth = probe.layer_depth();
   Comparison occupied("occupied"), colored("colour taken"), told("change told");
@@ -83,16 +84,14 @@ std::size_t check(Camera camera, Content content, int count, bool with_color, do
   if (with_color)
     for (std::size_t pixel = 0; pixel < scene.image.depth.size(); ++pixel) scene.image.color.push_back((random.bits() & 0xffffff) | 1);
   StagesProbe probe(camera.config);
-  probe.map().replace(surfels_near_surfaces(scene, count, random), 1);
-  if (count > 10) probe.kill({1, 8, 9});
+  const std::vector<std::uint32_t> slots = probe.map().replace(surfels_near_surfaces(scene, count, random), 1);
+  if (count > 10) probe.kill({slots[1], slots[8], slots[9]});
   const std::vector<Surfel> before = probe.map().download();
   probe.stages().begin_frame(scene.image, scene.T_world_camera, 4);
   probe.stages().observe_space();
-  std::vector<std::uint32_t> slots;  // those of dead surfels as well: removed ones are still listed
-  for (int slot = 0; slot < count; ++slot) slots.push_back(slot);
-  probe.set_in_view_slots(slots);
+  probe.set_in_view_slots(slots);  // those of dead surfels as well: removed ones are still listed
   probe.stages().label_surfels();
-  return compare(scene, probe, before, 4);
+  return compare(scene, probe, before);
 }
 
 TEST(StageLabels, RandomSurfels) {

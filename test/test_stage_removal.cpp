@@ -25,8 +25,10 @@ struct Expected {
 Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& view, const std::vector<Surfel>& map,
                         const std::vector<ViewSurfel>& in_view, const Field<char>& observed) {
   Expected expected = {{}, grid.field(Truth::no), 0, 0};
+  std::map<std::uint32_t, Surfel> by_slot;
+  for (const Surfel& surfel : map) by_slot[surfel.id] = surfel;
   for (const ViewSurfel& s : in_view) {
-    const Surfel& surfel = map[s.slot];
+    const Surfel& surfel = by_slot.at(s.slot);
     const Voxel voxel = voxel_of(Vector3d(s.i, s.j, s.k), 2e-5);
     const Vector3i v = voxel.index;
     if (!grid.contains(v)) {
@@ -67,7 +69,7 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   const SeenView view = {random_image(camera, content, random), random.pose(2, 3)};
   probe.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
   const std::vector<Surfel> map = probe.map().download();
-  if (count > 10) probe.kill({7, 2, 9});  // so that a surfel's number in view is not its slot
+  if (count > 10) probe.kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
   probe.stages().begin_frame(view.image, view.T_world_camera, 2);
   probe.stages().select_in_view();
   EXPECT_EQ(probe.stages().split_surfels(), 0u);
@@ -129,7 +131,16 @@ TEST(StageRemoval, FrontierOnThinGapsGoes) {
   }
 }
 
-TEST(StageRemoval, FreesSlotsInOrder) {
+/// The numbers of set bits in the order of words and, in them, of layers.
+std::vector<std::uint32_t> in_order(const Field<char>& bits) {
+  std::vector<std::uint32_t> numbers;
+  const auto words = pack(bits);
+  for (std::size_t bit = 0; bit < 64 * words.size(); ++bit)
+    if (words[bit / 64] >> (bit % 64) & 1) numbers.push_back(static_cast<std::uint32_t>(bit));
+  return numbers;
+}
+
+TEST(StageRemoval, FreesSlots) {
   for (const int count : {0, 1, 64, 65, 300}) {
     SCOPED_TRACE(std::to_string(count) + " surfels");
     const Camera camera = cameras().front();
@@ -137,31 +148,32 @@ TEST(StageRemoval, FreesSlotsInOrder) {
     const Nuvg grid(camera.intrinsics, camera.config);
     StagesProbe probe(camera.config);
     probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), count, 2, 2, random), 1);
-    if (count > 64) probe.kill({3, 60, 4});
+    if (count > 64) probe.kill(some_slots(probe.map().download(), 20));
     probe.stages().begin_frame(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity(), 9);
     probe.stages().select_in_view();
     probe.stages().split_surfels();
     std::map<std::uint32_t, Surfel> expected;
     for (const Surfel& surfel : probe.map().download()) expected[surfel.id] = surfel;
-    std::vector<std::uint32_t> free_list = probe.free_list();
     const std::vector<std::uint32_t> slots = probe.in_view_slots();
     std::vector<std::uint64_t> removed((slots.size() + 63) / 64, 0);
     std::set<std::uint32_t> removed_slots;
     for (std::size_t n = 0; n < slots.size(); ++n) {
       if (!random.chance(0.4)) continue;
       removed[n / 64] |= std::uint64_t{1} << (n % 64);
-      free_list.push_back(slots[n]);
       removed_slots.insert(slots[n]);
       expected.erase(slots[n]);
     }
     probe.set_removed_bits(removed);
 
     EXPECT_EQ(probe.stages().remove_surfels(), removed_slots.size());
-    EXPECT_TRUE(probe.free_list() == free_list);
+    for (const std::uint32_t slot : removed_slots) EXPECT_FALSE(probe.is_alive(slot));
+    EXPECT_EQ(probe.map().size(), expected.size());
+    EXPECT_TRUE(probe.created_voxels() == in_order(candidates));
     const std::vector<Surfel> left = probe.map().download();
     ASSERT_EQ(left.size(), expected.size());
     for (const Surfel& surfel : left) EXPECT_TRUE(expected.count(surfel.id) && same(surfel, expected[surfel.id])) << surfel.id;
-    const Changes changes = probe.map().changes(8);
+    probe.stages().finish_frame();
+    const Changes changes = probe.map().last_changes();
     EXPECT_TRUE(changes.updated.empty());
     EXPECT_TRUE(std::set<std::uint32_t>(changes.removed.begin(), changes.removed.end()) == removed_slots);
   }

@@ -22,6 +22,7 @@ namespace {
   F(padding_i)         \
   F(padding_j) F(padding_k) F(first_pyramid_layer) F(fx) F(fy) F(f) F(center_i) F(center_j) F(k_min) F(z_min) F(z_max) F(delta_min)
 #define TRANSFORM_FIELDS(F) F(r00) F(r01) F(r02) F(r10) F(r11) F(r12) F(r20) F(r21) F(r22) F(t0) F(t1) F(t2)
+#define WINDOW_FIELDS(F) F(origin_x) F(origin_y) F(origin_z) F(size_x) F(size_y) F(size_z) F(block_size)
 #define VIEW_FIELDS(F)                                                                                                               \
   F(T_camera_world.r00)                                                                                                              \
   F(T_camera_world.r01)                                                                                                              \
@@ -55,8 +56,8 @@ std::string probe_source(const std::string& type, const std::vector<std::string>
 TestKernels& probes() {
   static auto* const kernels =
       new TestKernels(probe_source("Grid", NAMES(GRID_FIELDS)) + probe_source("Transform", NAMES(TRANSFORM_FIELDS)) +
-                      probe_source("View", NAMES(VIEW_FIELDS)) + probe_source("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS)) +
-                      probe_source("Limits", NAMES(LIMITS_FIELDS)));
+                      probe_source("Window", NAMES(WINDOW_FIELDS)) + probe_source("View", NAMES(VIEW_FIELDS)) +
+                      probe_source("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS)) + probe_source("Limits", NAMES(LIMITS_FIELDS)));
   return *kernels;
 }
 
@@ -87,6 +88,12 @@ TEST(StageShared, Grid) {
 TEST(StageShared, Transform) {
 #define OFFSET(field) offsetof(Transform, field),
   check<Transform>("Transform", NAMES(TRANSFORM_FIELDS), {TRANSFORM_FIELDS(OFFSET)});
+#undef OFFSET
+}
+
+TEST(StageShared, Window) {
+#define OFFSET(field) offsetof(Window, field),
+  check<Window>("Window", NAMES(WINDOW_FIELDS), {WINDOW_FIELDS(OFFSET)});
 #undef OFFSET
 }
 

@@ -48,12 +48,11 @@ struct Scene {
     std::vector<Surfel> surfels;
     while (static_cast<int>(surfels.size()) < count)
       for (const Surfel& surfel : random_surfels(grid, T_world_camera, 1, around, largest, random))
-        if (!split_levels(grid, seen(surfel)).open) surfels.push_back(surfel);
-    probe.map().replace(surfels, 1);
+        if (!split_levels(grid, seen(quantised(surfel, camera.config))).open) surfels.push_back(surfel);
     std::vector<std::uint32_t> dead;
-    for (int slot = 0; slot < count; ++slot)
+    for (const std::uint32_t slot : probe.map().replace(surfels, 1))
       if (random.chance(0.1)) dead.push_back(slot);
-    if (!dead.empty()) probe.kill(dead);
+    probe.kill(dead);
     probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 7);
   }
   SeenSurfel seen(const Surfel& surfel) const { return see(grid, T_world_camera.inverse(), surfel); }
@@ -90,9 +89,9 @@ TEST(StageSurfelsInView, Selection) {
     Scene scene(camera, 130, 24, 2, 1);
     const std::vector<Surfel> surfels = scene.probe.map().download();
     const std::size_t count = scene.probe.stages().select_in_view();
-    const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
+    std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
     ASSERT_EQ(slots.size(), count);
-    EXPECT_TRUE(std::is_sorted(slots.begin(), slots.end()));
+    std::sort(slots.begin(), slots.end());
     EXPECT_TRUE(std::adjacent_find(slots.begin(), slots.end()) == slots.end());
     std::size_t alive = 0;
     for (const Surfel& surfel : surfels) {
@@ -133,13 +132,13 @@ TEST(StageSurfelsInView, HowTheGridSeesThem) {
     EXPECT_EQ(scene.probe.stages().split_surfels(), 0u);
     const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
     const std::vector<ViewSurfel> placed = scene.probe.view_surfels();
-    std::map<std::uint32_t, Surfel> by_slot;
-    for (const Surfel& surfel : surfels) by_slot[surfel.id] = surfel;
+    std::map<std::uint32_t, Surfel> map;
+    for (const Surfel& surfel : surfels) map[surfel.id] = surfel;
     for (std::size_t n = 0; n < placed.size(); ++n) {
       const ViewSurfel& actual = placed[n];
       ASSERT_EQ(actual.slot, slots[n]);
       EXPECT_EQ(actual.ragged, actual.slot == surfels[3].id || actual.slot == surfels[50].id || actual.slot == surfels[90].id ? 1u : 0u);
-      const SeenSurfel s = scene.seen(by_slot.at(actual.slot));
+      const SeenSurfel s = scene.seen(map.at(actual.slot));
       if (std::abs(s.p_camera.z() - scene.grid.z_min) < 1e-5) continue;  // either part of the grid
       SCOPED_TRACE("slot " + std::to_string(actual.slot));
       EXPECT_NEAR(actual.i, s.c.x(), 1e-3);
@@ -168,15 +167,16 @@ void split_literally(const Vector3d& p, double r, int levels, const Vector3d& x_
     for (const int b : {-1, 1}) split_literally(p + step * (a * x_psi + b * y_psi), r / 2, levels - 1, x_psi, y_psi, centers);
 }
 
-void check_children(const Surfel& parent, int levels, const std::vector<Surfel>& children) {
+/// @param step  of the map's positions [m]
+void check_children(const Surfel& parent, int levels, const std::vector<Surfel>& children, double step) {
   const Vector3d p = parent.position.cast<double>(), n = parent.normal.cast<double>();
   Vector3d corner = Vector3d::Zero();
   double area = 0;
   for (const Surfel& child : children) {
     const Vector3d offset = child.position.cast<double>() - p;
     if (offset.norm() > corner.norm()) corner = offset;
-    EXPECT_NEAR(offset.dot(n), 0, 1e-4 * parent.radius + 1e-6);
-    EXPECT_NEAR(child.radius, parent.radius / (1 << levels), 1e-6 * parent.radius);
+    EXPECT_NEAR(offset.dot(n), 0, 1e-4 * parent.radius + step);
+    EXPECT_EQ(child.radius, parent.radius / static_cast<float>(1 << levels)) << "16 bits hold it exactly";
     EXPECT_TRUE(child.normal == parent.normal && child.label == parent.label && child.rgb == parent.rgb);
     area += static_cast<double>(child.radius) * child.radius;
   }
@@ -189,8 +189,54 @@ void check_children(const Surfel& parent, int levels, const std::vector<Surfel>&
   for (const Vector3d& center : expected) {
     double nearest = 1e9;
     for (const Surfel& child : children) nearest = std::min(nearest, (child.position.cast<double>() - center).norm());
-    EXPECT_LT(nearest, 1e-3 * parent.radius) << "no surfel at an expected place";
+    EXPECT_LT(nearest, 1e-3 * parent.radius + 3 * step) << "no surfel at an expected place";
   }
+}
+
+using BySlot = std::map<std::uint32_t, Surfel>;
+
+BySlot by_slot(const std::vector<Surfel>& surfels) {
+  BySlot sorted;
+  for (const Surfel& surfel : surfels) sorted[surfel.id] = surfel;
+  return sorted;
+}
+
+/// What splitting has made of the surfels in view, and what is told of it.
+struct Split {
+  std::size_t parents = 0, children = 0;
+  int most_levels = 0;
+  std::set<std::uint32_t> updated, removed;
+};
+
+Split check_split(Scene& scene, const BySlot& before, const std::vector<std::uint32_t>& in_view) {
+  const BySlot after = by_slot(scene.probe.map().download());
+  const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
+  const std::vector<ViewSurfel> placed = scene.probe.view_surfels();
+  Split split;
+  for (std::size_t n = 0; n < in_view.size(); ++n) {
+    const Levels expected = split_levels(scene.grid, scene.seen(before.at(in_view[n])));
+    SCOPED_TRACE("slot " + std::to_string(in_view[n]) + ", levels " + std::to_string(expected.levels));
+    split.most_levels = std::max(split.most_levels, expected.levels);
+    if (expected.levels == 0) {
+      EXPECT_TRUE(same(after.at(in_view[n]), before.at(in_view[n])));
+      continue;
+    }
+    ++split.parents;
+    split.removed.insert(in_view[n]);
+    EXPECT_LT(placed[n].i, -1e5F) << "the parent is still in view";
+    std::vector<Surfel> children;
+    for (int child = 0; child < 1 << (2 * expected.levels); ++child) {
+      const std::size_t number = in_view.size() + split.children++;
+      EXPECT_EQ(placed.at(number).slot, slots.at(number));
+      EXPECT_TRUE(split.updated.insert(slots.at(number)).second) << "two surfels in one slot";
+      children.push_back(after.at(slots.at(number)));
+    }
+    check_children(before.at(in_view[n]), expected.levels, children, position_step(scene.camera.config));
+  }
+  EXPECT_EQ(slots.size(), in_view.size() + split.children);
+  EXPECT_EQ(after.size(), before.size() + split.children - split.parents);
+  for (const std::uint32_t slot : split.updated) split.removed.erase(slot);  // taken again
+  return split;
 }
 
 TEST(StageSurfelsInView, Split) {
@@ -198,37 +244,20 @@ TEST(StageSurfelsInView, Split) {
   for (const Camera& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 150, 3, 20, 4);
-    std::map<std::uint32_t, Surfel> before, after;
-    for (const Surfel& surfel : scene.probe.map().download()) before[surfel.id] = surfel;
-    const std::vector<std::uint32_t> new_slots = scene.probe.new_slots(10000);
+    const BySlot before = by_slot(scene.probe.map().download());
     scene.probe.stages().select_in_view();
     const std::vector<std::uint32_t> in_view = scene.probe.in_view_slots();
     const std::size_t added = scene.probe.stages().split_surfels();
-    const std::vector<std::uint32_t> in_view_after = scene.probe.in_view_slots();
-    for (const Surfel& surfel : scene.probe.map().download()) after[surfel.id] = surfel;
-    EXPECT_EQ(after.size(), before.size() + added);
-    ASSERT_EQ(in_view_after.size(), in_view.size() + added);
-    for (std::size_t n = 0; n < added; ++n) EXPECT_EQ(in_view_after[in_view.size() + n], new_slots[n]);
-
-    std::size_t addition = 0;
-    std::set<std::uint32_t> changed;
-    for (const std::uint32_t slot : in_view) {
-      const Levels expected = split_levels(scene.grid, scene.seen(before.at(slot)));
-      std::vector<Surfel> children = {after.at(slot)};
-      for (int n = 1; n < 1 << (2 * expected.levels); ++n) children.push_back(after.at(new_slots.at(addition++)));
-      most_levels = std::max(most_levels, expected.levels);
-      SCOPED_TRACE("slot " + std::to_string(slot) + ", levels " + std::to_string(expected.levels));
-      if (expected.levels == 0) {
-        EXPECT_TRUE(same(after.at(slot), before.at(slot)));
-      } else {
-        check_children(before.at(slot), expected.levels, children);
-        for (const Surfel& child : children) changed.insert(child.id);
-      }
-    }
-    EXPECT_EQ(addition, added);
-    std::set<std::uint32_t> told;
-    for (const Surfel& surfel : scene.probe.map().changes(6).updated) told.insert(surfel.id);
-    EXPECT_TRUE(told == changed);
+    const Split split = check_split(scene, before, in_view);
+    EXPECT_EQ(added, split.children - split.parents);
+    EXPECT_EQ(scene.probe.map().size(), before.size() + added);
+    most_levels = std::max(most_levels, split.most_levels);
+    scene.probe.stages().finish_frame();
+    const Changes told = scene.probe.map().last_changes();
+    std::set<std::uint32_t> updated;
+    for (const Surfel& surfel : told.updated) updated.insert(surfel.id);
+    EXPECT_TRUE(updated == split.updated);
+    EXPECT_TRUE(std::set<std::uint32_t>(told.removed.begin(), told.removed.end()) == split.removed);
   }
   EXPECT_GE(most_levels, 3) << "nothing was tested";
 }

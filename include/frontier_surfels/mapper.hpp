@@ -34,7 +34,8 @@ class Mapper {
   /// The surfels whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
 
-  /// What has changed since the map had sequence number `since` (0: everything).
+  /// What has changed since the map had sequence number `since` (0: everything): the last frame's changes exactly, earlier ones with some
+  /// surfels around that have not changed, and ids that were free already.
   Changes changes(std::uint64_t since) const;
 
   /// Writes the map as a PLY file, to a temporary file first that is then renamed. @throws FileError
@@ -44,7 +45,8 @@ class Mapper {
   /// method then trusts those a little more). @throws FileError: the map stays as it was
   void load(const std::string& path);
 
-  /// The same with surfels from elsewhere, as surfels() gives them; their ids are counted anew.
+  /// The same from memory; ids are given anew. Surfels far larger than any that this mapper makes (of 2 m, where z_max is up to 12 m)
+  /// become so small.
   void load(const std::vector<Surfel>& surfels);
 
   /// Forgets everything but the configuration and the sequence number.

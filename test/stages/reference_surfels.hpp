@@ -7,14 +7,33 @@
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
+#include "map_window.hpp"
 #include "random_input.hpp"
 #include "reference_grid.hpp"
+#include "surfel_packing.hpp"
 
 namespace frontier_surfels::reference {
 
 /// Bit by bit.
 inline bool same(const Surfel& a, const Surfel& b) {
   return a.id == b.id && a.position == b.position && a.normal == b.normal && a.radius == b.radius && a.label == b.label && a.rgb == b.rgb;
+}
+
+/// So far from where it was put a surfel of the map may stand along an axis [m].
+inline double position_step(const Config& config) { return block_size_for(config.z_max) / 65536; }
+
+/// The surfel that the map has of this one.
+inline Surfel quantised(const Surfel& surfel, const Config& config) {
+  const double block_size = block_size_for(config.z_max);
+  const BlockKey block = block_of(surfel.position, block_size);
+  return unpack(pack(surfel, block, block_size), block, block_size);
+}
+
+/// Every `stride`-th surfel's slot.
+inline std::vector<std::uint32_t> some_slots(const std::vector<Surfel>& surfels, std::size_t stride) {
+  std::vector<std::uint32_t> slots;
+  for (std::size_t n = 0; n < surfels.size(); n += stride) slots.push_back(surfels[n].id);
+  return slots;
 }
 
 struct SeenSurfel {

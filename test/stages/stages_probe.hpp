@@ -39,11 +39,16 @@ inline Commands& test_commands() {
 class StagesProbe {
  public:
   explicit StagesProbe(const Config& config, Commands& commands = test_commands())
-      : commands_(commands), map_(commands), views_(commands, config), stages_(commands, config, map_, views_) {
+      : commands_(commands),
+        lists_(commands),
+        map_(commands, lists_, config),
+        views_(commands, config),
+        stages_(commands, lists_, config, map_, views_) {
     views_.clear(false);  // as if views had been forgotten: the known space must be computed
   }
 
   Stages& stages() { return stages_; }
+  Lists& lists() { return lists_; }
   SurfelMap& map() { return map_; }
   RecentViews& views() { return views_; }
   Commands& commands() { return commands_; }
@@ -103,46 +108,25 @@ class StagesProbe {
     stages_.hull_.write(hull);
   }
 
-  /// Takes surfels out of the map, as an earlier frame would have: their slots are free, the last one first.
+  /// Takes surfels out of the map, as an earlier frame would have.
   void kill(const std::vector<std::uint32_t>& slots) {
-    const cl_float4 dead = {{0, 0, 0, 0}};
-    for (const std::uint32_t slot : slots)
-      commands_.queue().enqueueWriteBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(dead), sizeof(dead), &dead);
-    commands_.queue().enqueueWriteBuffer(map_.free_list(), CL_TRUE, map_.free_slots() * sizeof(cl_uint), slots.size() * sizeof(cl_uint),
-                                         slots.data());
+    for (const std::uint32_t slot : slots) {
+      const auto word = peek<cl_ulong>(map_.alive(), slot / PAGE_SLOTS);
+      poke(map_.alive(), slot / PAGE_SLOTS, word & ~(cl_ulong{1} << slot % PAGE_SLOTS));
+    }
     map_.removed(slots.size());
   }
 
-  std::uint32_t attributes(std::uint32_t slot) const {
-    std::uint32_t bits;
-    commands_.queue().enqueueReadBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(cl_float4) + 3 * sizeof(float), sizeof(bits),
-                                        &bits);
-    return bits;
+  cl_uint4 packed(std::uint32_t slot) const { return peek<cl_uint4>(map_.surfels(), slot); }
+  std::uint32_t attributes(std::uint32_t slot) const { return packed(slot).s[3]; }
+  bool is_alive(std::uint32_t slot) const { return peek<cl_ulong>(map_.alive(), slot / PAGE_SLOTS) >> slot % PAGE_SLOTS & 1; }
+  BlockKey block_of_slot(std::uint32_t slot) const {
+    const auto block = peek<cl_int4>(map_.page_block(), slot / PAGE_SLOTS);
+    return {block.s[0], block.s[1], block.s[2]};
   }
 
   void make_ragged(const std::vector<std::uint32_t>& slots) {
-    for (const std::uint32_t slot : slots) {
-      const std::uint32_t bits = attributes(slot) | SURFEL_RAGGED;
-      commands_.queue().enqueueWriteBuffer(map_.normal_attributes(), CL_TRUE, slot * sizeof(cl_float4) + 3 * sizeof(float), sizeof(bits),
-                                           &bits);
-    }
-  }
-
-  /// In the order in which they were freed.
-  std::vector<std::uint32_t> free_list() const {
-    std::vector<std::uint32_t> slots(map_.free_slots());
-    if (slots.empty()) return slots;
-    commands_.queue().enqueueReadBuffer(map_.free_list(), CL_TRUE, 0, slots.size() * sizeof(cl_uint), slots.data());
-    return slots;
-  }
-
-  /// The first slots that new surfels take: free ones, the last freed first, then those beyond the end.
-  std::vector<std::uint32_t> new_slots(std::size_t count) const {
-    std::vector<std::uint32_t> slots = free_list();
-    std::reverse(slots.begin(), slots.end());
-    for (std::size_t slot = map_.slots(); slots.size() < count; ++slot) slots.push_back(static_cast<std::uint32_t>(slot));
-    slots.resize(count);
-    return slots;
+    for (const std::uint32_t slot : slots) poke(map_.surfels(), 4 * std::size_t{slot} + 3, cl_uint{attributes(slot) | SURFEL_RAGGED});
   }
 
   /// Lets section 4 work on all paths through the voxels around these candidates, no more. Replaces the candidates.
@@ -204,7 +188,7 @@ class StagesProbe {
     DeviceArray<cl_uint> array(commands_);
     array.resize(values.size() + 1);
     array.write(values);
-    *total = stages_.scan("test", array, values.size());
+    *total = lists_.scan("test", array, values.size());
     return array.read(values.empty() ? 0 : values.size() + 1);
   }
 
@@ -212,7 +196,7 @@ class StagesProbe {
     DeviceArray<cl_ulong> bits(commands_);
     DeviceArray<cl_uint> list(commands_);
     bits.write(words);
-    return list.read(stages_.list_bits("test", bits, words.size(), list));
+    return list.read(lists_.list_bits("test", bits, words.size(), list));
   }
 
  private:
@@ -229,7 +213,19 @@ class StagesProbe {
     return bits;
   }
 
+  template <typename T>
+  T peek(const cl::Buffer& buffer, std::size_t index) const {
+    T value;
+    commands_.queue().enqueueReadBuffer(buffer, CL_TRUE, index * sizeof(T), sizeof(T), &value);
+    return value;
+  }
+  template <typename T>
+  void poke(const cl::Buffer& buffer, std::size_t index, const T& value) {
+    commands_.queue().enqueueWriteBuffer(buffer, CL_TRUE, index * sizeof(T), sizeof(T), &value);
+  }
+
   Commands& commands_;
+  Lists lists_;
   SurfelMap map_;
   RecentViews views_;
   Stages stages_;

@@ -1,0 +1,110 @@
+/// Pages of blocks: numbers that are given, taken back and given again.
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "block_index.hpp"
+#include "stages/random_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using Pages = BlockIndex::Pages;
+
+TEST(BlockIndex, IsEmptyAtFirst) {
+  const BlockIndex index;
+  EXPECT_EQ(index.find({0, 0, 0}), nullptr);
+  EXPECT_EQ(index.end(), 0u);
+  EXPECT_EQ(index.used(), 0u);
+  EXPECT_TRUE(index.blocks().empty());
+}
+
+TEST(BlockIndex, CountsPagesUp) {
+  BlockIndex index;
+  EXPECT_EQ(index.add_page({1, -2, 3}), 0u);
+  EXPECT_EQ(index.add_page({-1, 2, -3}), 1u);
+  EXPECT_EQ(index.add_page({1, -2, 3}), 2u);
+  EXPECT_EQ(*index.find({1, -2, 3}), (Pages{0, 2}));
+  EXPECT_EQ(*index.find({-1, 2, -3}), Pages{1});
+  EXPECT_EQ(index.find({3, -2, 1}), nullptr) << "coordinates are not interchangeable";
+  EXPECT_EQ(index.end(), 3u);
+  EXPECT_EQ(index.used(), 3u);
+}
+
+TEST(BlockIndex, GivesFreePagesAgain) {
+  BlockIndex index;
+  const BlockKey a = {0, 0, 0}, b = {0, 0, 1};
+  for (int n = 0; n < 3; ++n) index.add_page(a);
+  index.remove_page(a, 1);
+  EXPECT_EQ(*index.find(a), (Pages{0, 2}));
+  EXPECT_EQ(index.end(), 3u);
+  EXPECT_EQ(index.used(), 2u);
+  EXPECT_EQ(index.add_page(b), 1u);
+  EXPECT_EQ(index.add_page(b), 3u);
+  EXPECT_EQ(*index.find(b), (Pages{1, 3}));
+}
+
+TEST(BlockIndex, ForgetsBlocksWithoutPages) {
+  BlockIndex index;
+  index.add_page({5, 5, 5});
+  index.remove_page({5, 5, 5}, 0);
+  EXPECT_EQ(index.find({5, 5, 5}), nullptr);
+  EXPECT_TRUE(index.blocks().empty());
+  EXPECT_EQ(index.used(), 0u);
+}
+
+TEST(BlockIndex, TakesOnlyWhatABlockHas) {
+  BlockIndex index;
+  index.add_page({0, 0, 0});
+  index.add_page({1, 0, 0});
+  index.remove_page({0, 0, 0}, 1);  // another's
+  index.remove_page({7, 0, 0}, 0);
+  EXPECT_EQ(index.used(), 2u);
+  EXPECT_EQ(index.add_page({2, 0, 0}), 2u);
+}
+
+/// Pages that a map had before it was replaced: free, the lowest first, as in a new one.
+TEST(BlockIndex, SkipsToPagesUsedBefore) {
+  BlockIndex index;
+  index.add_page({0, 0, 0});
+  index.skip_to(4);
+  EXPECT_EQ(index.end(), 4u);
+  EXPECT_EQ(index.used(), 1u);
+  for (const std::uint32_t page : {1u, 2u, 3u, 4u}) EXPECT_EQ(index.add_page({1, 0, 0}), page);
+  index.skip_to(2);
+  EXPECT_EQ(index.end(), 5u) << "it was further already";
+  EXPECT_EQ(index.used(), 5u);
+}
+
+TEST(BlockIndex, AsASlowBookOfPages) {
+  reference::Random random(1);
+  BlockIndex index;
+  std::map<BlockKey, Pages> book;
+  std::set<std::uint32_t> used;
+  std::size_t most = 0;
+  for (int step = 0; step < 20000; ++step) {
+    const BlockKey block = {random.whole(-3, 3), random.whole(-3, 3), random.whole(-1, 1)};
+    Pages& pages = book[block];
+    if (random.chance(step < 10000 ? 0.6 : 0.4)) {
+      pages.push_back(index.add_page(block));
+      EXPECT_TRUE(used.insert(pages.back()).second) << "given twice";
+    } else if (!pages.empty()) {
+      const auto at = pages.begin() + random.whole(0, static_cast<int>(pages.size()) - 1);
+      index.remove_page(block, *at);
+      used.erase(*at);
+      pages.erase(at);
+    }
+    most = std::max(most, used.size());
+    ASSERT_EQ(index.used(), used.size());
+    ASSERT_EQ(index.end(), most) << "free pages first";
+  }
+  for (const auto& [block, pages] : book) {
+    const Pages* found = index.find(block);
+    EXPECT_TRUE(pages.empty() ? found == nullptr : found != nullptr && *found == pages);
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

@@ -1,0 +1,145 @@
+/// The window of a view: every block with a surfel that may reach into the grid is in it, whatever the camera and its pose.
+
+#include <gtest/gtest.h>
+
+#include "map_window.hpp"
+#include "stages/reference_surfels.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+/// Centre (grid coordinates) of a surfel of radius r [m] with a normal (camera frame) in whose ellipsoid a point of the grid's coordinates
+/// lies, `along` of its thickness along the normal and `across` of its reach in the disc. Found by iteration, as the ellipsoid's shape
+/// depends on where its centre is. @return whether there is one
+bool center_around(const Nuvg& grid, double thickness, const Vector3d& point, double r, const Vector3d& normal, double along,
+                   const Vector3d& across, Vector3d* center) {
+  *center = point;
+  for (int n = 0; n < 200; ++n) {
+    const Vector3d p = grid.from_grid(*center);
+    const Vector3d ray = p.z() >= grid.z_min ? Vector3d(p / p.z()) : Vector3d(0, 0, 1);
+    const Vector3d u = along * thickness * normal + 2 * r / grid.voxel_size(p.z()) * across;
+    const Vector3d next =
+        point - Vector3d(u.x() - (p.z() >= grid.z_min ? ray.x() : 0) * u.z(), u.y() - (p.z() >= grid.z_min ? ray.y() : 0) * u.z(), u.z());
+    if ((next - *center).norm() < 1e-6) return true;
+    *center = 0.5 * (*center + next);
+  }
+  return false;
+}
+
+/// A point in the grid or one voxel beside it, often on the very border.
+Vector3d point_of_grid(const Nuvg& grid, Random& random) {
+  const double sizes[] = {double(grid.size_i), double(grid.size_j), double(grid.size_k)};
+  Vector3d point;
+  for (int axis = 0; axis < 3; ++axis) {
+    point[axis] = random.uniform(-1, sizes[axis]);
+    if (random.chance(0.5)) point[axis] = random.chance(0.5) ? -1 : sizes[axis];
+  }
+  return point;
+}
+
+struct Tally {
+  int surfels = 0;
+  double met = 0, cells = 0;
+};
+
+/// @param largest  radius that surfels of the map have [m]; 0: what this view's own may have
+void check(const Camera& camera, const Eigen::Isometry3d& T_world_camera, double largest, Random& random, Tally& tally) {
+  const Nuvg grid(camera.intrinsics, camera.config);
+  StagesProbe probe(camera.config);
+  if (largest > 0) {
+    Surfel surfel;
+    surfel.radius = static_cast<float>(largest);
+    probe.map().replace({surfel}, 1);
+  } else {
+    largest = std::sqrt(3.0) / 2 * grid.voxel_size(grid.from_grid(Vector3d(0, 0, grid.size_k - 1)).z());
+  }
+  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 1);
+  const MapWindow& window = probe.map().window();
+  const Window& w = window.window();
+  const double block_size = block_size_for(camera.config.z_max);
+  EXPECT_EQ(w.block_size, block_size);
+  for (int n = 0; n < (small_tests() ? 200 : 3000); ++n) {
+    const bool across_view = random.chance(0.3);
+    const Vector3d normal = across_view ? Vector3d::UnitZ() : random.direction(), across = random.direction();
+    const Vector3d in_disc = (across - across.dot(normal) * normal).normalized();
+    const double angle = random.uniform(0, 2 * M_PI), r = random.chance(0.5) ? largest : random.uniform(0, largest);
+    Vector3d center;
+    if (!center_around(grid, camera.config.thickness, point_of_grid(grid, random), r, normal, std::cos(angle), std::sin(angle) * in_disc,
+                       &center))
+      continue;
+    // In the grid none is larger than 7 voxels; beyond it far larger ones are bent so much that what reaches into the grid says nothing,
+    // unless they lie across the view.
+    constexpr double kLargest = 12;
+    const Vector3d p_camera = grid.from_grid(center);
+    if (!across_view && 2 * r > kLargest * grid.voxel_size(p_camera.z())) continue;
+    ++tally.surfels;
+    const Vector3d p = T_world_camera * p_camera;
+    const BlockKey block = block_of(p.cast<float>(), block_size);
+    const int x = block.x - w.origin_x, y = block.y - w.origin_y, z = block.z - w.origin_z;
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < w.size_x && y < w.size_y && z < w.size_z;
+    ASSERT_TRUE(inside) << "a surfel of radius " << r << " m at " << center.transpose();
+    ASSERT_TRUE(window.block((z * w.size_y + y) * w.size_x + x) == block);
+    ASSERT_TRUE(window.meets_grid(block)) << "a surfel of radius " << r << " m at " << center.transpose();
+  }
+  for (int cell = 0; cell < window.cells(); ++cell) tally.met += window.meets_grid(window.block(cell));
+  tally.cells += window.cells();
+}
+
+TEST(MapWindow, HasEveryBlockThatReachesIntoTheGrid) {
+  Tally tally;
+  Random random(1);
+  std::vector<Camera> all = cameras();
+  all.push_back(make_camera(200, 100, 130, 130, 200));  // a wide cuboid before the pyramid, and fine voxels
+  all.back().config.z_min = 1.8;
+  all.back().config.z_max = 3;
+  for (const Camera& camera : all)
+    for (const double largest : {0.0, 0.05, 0.4})
+      for (int n = 0; n < 5; ++n) {
+        SCOPED_TRACE(camera.name + ", radius " + std::to_string(largest) + " m");
+        Eigen::Isometry3d T_world_camera = random.pose(1000, 3.1);
+        if (n == 0) T_world_camera.linear().setIdentity();
+        check(camera, T_world_camera, largest, random, tally);
+      }
+  EXPECT_GT(tally.surfels, 5000) << "nothing was tested";
+  EXPECT_LT(tally.met, 0.9 * tally.cells) << "blocks in the window's corners are spared";
+}
+
+/// Only rotations and translations that floats hold: the local frame and its pose are then the same to the last bit.
+TEST(MapWindow, IsTheSameAnywhere) {
+  const Camera camera = cameras().front();
+  Random random(2);
+  Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+  here.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  here.translation() = Vector3d(0.3125, -7.75, 1.125);
+  StagesProbe probe(camera.config);
+  const WorkingImage image = random_image(camera, Content::all_invalid, random);
+  probe.stages().begin_frame(image, here, 1);
+  const MapWindow first = probe.map().window();
+  for (const Vector3d& shift : {Vector3d(4096, -8192, 512), Vector3d(-50000, 49999.5, 3)}) {
+    probe.stages().begin_frame(image, Eigen::Translation3d(shift) * here, 2);
+    const MapWindow& window = probe.map().window();
+    EXPECT_TRUE(window.T_camera_local().matrix() == first.T_camera_local().matrix());
+    ASSERT_EQ(window.cells(), first.cells());
+    for (int cell = 0; cell < first.cells(); ++cell) {
+      const BlockKey a = first.block(cell), b = window.block(cell);
+      const int blocks[] = {b.x - a.x, b.y - a.y, b.z - a.z};
+      for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(blocks[axis], 2 * shift[axis]);
+      EXPECT_EQ(first.meets_grid(a), window.meets_grid(b));
+    }
+  }
+}
+
+TEST(MapWindow, BlocksSuitTheRange) {
+  for (const double z_max : {0.02, 3.0, 12.0, 12.1, 100.0, 1000.0}) {
+    const double size = block_size_for(z_max);
+    EXPECT_EQ(std::exp2(std::round(std::log2(size))), size) << "a power of two";
+    EXPECT_LE(z_max, 24 * size);
+    EXPECT_TRUE(size == 0.5 || z_max > 12 * size);
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels

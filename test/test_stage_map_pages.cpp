@@ -1,0 +1,335 @@
+/// The map's pages: where new surfels go, what becomes of empty pages, and what is told of changes; against a slow book of all slots.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "stages/reference_surfels.hpp"
+#include "stages/stages_probe.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using namespace reference;
+
+using Packed = std::array<std::uint32_t, 4>;
+
+Packed to_array(const cl_uint4& packed) { return {packed.s[0], packed.s[1], packed.s[2], packed.s[3]}; }
+
+/// What should be in the map: every surfel's slot and packed form, and every page's block.
+struct Book {
+  std::map<std::uint32_t, Packed> surfels;
+  std::map<std::uint32_t, BlockKey> pages;
+
+  /// Lowest free slots of a page.
+  std::vector<std::uint32_t> free_slots(std::uint32_t page) const {
+    std::vector<std::uint32_t> free;
+    for (std::uint32_t slot = PAGE_SLOTS * page; slot < PAGE_SLOTS * (page + 1); ++slot)
+      if (surfels.count(slot) == 0) free.push_back(slot);
+    return free;
+  }
+};
+
+/// A map, and the window of a view of it.
+class Pages {
+ public:
+  explicit Pages(unsigned seed, Commands& commands = test_commands()) : random_(seed), probe_(camera_.config, commands) {}
+
+  StagesProbe& probe() { return probe_; }
+  SurfelMap& map() { return probe_.map(); }
+  const Book& book() const { return book_; }
+
+  /// Fills the map anew with surfels in and around the next window.
+  void fill(int count) {
+    const Nuvg grid(camera_.intrinsics, camera_.config);
+    const std::vector<Surfel> surfels = random_surfels(grid, pose_, count, 4, 2, random_);
+    const std::vector<std::uint32_t> slots = map().replace(surfels, 1);
+    book_ = {};
+    for (const std::uint32_t slot : slots) note(slot, to_array(probe_.packed(slot)));
+    EXPECT_EQ(book_.surfels.size(), surfels.size()) << "slots are given twice";
+    for (std::size_t n = 0; n < surfels.size(); ++n) {
+      const BlockKey block = block_of(surfels[n].position, kBlock);
+      EXPECT_EQ(to_array(probe_.packed(slots[n])), to_array(frontier_surfels::pack(surfels[n], block, kBlock)));
+      EXPECT_TRUE(probe_.block_of_slot(slots[n]) == block);
+    }
+  }
+
+  void open_window(std::uint32_t frame) {
+    frame_ = frame;
+    probe_.stages().begin_frame(random_image(camera_, Content::all_invalid, random_), pose_, frame);
+    cells_.clear();
+    const MapWindow& window = map().window();
+    for (int cell = 0; cell < window.cells(); ++cell)
+      if (window.meets_grid(window.block(cell))) cells_.push_back(static_cast<cl_uint>(cell));
+  }
+
+  /// Random surfels in a few cells of the window.
+  void insert(int count, int cells) {
+    std::vector<cl_uint> some;
+    for (int n = 0; n < cells; ++n) some.push_back(cells_[random_.whole(0, static_cast<int>(cells_.size()) - 1)]);
+    std::vector<cl_uint4> surfels;
+    std::vector<cl_uint> where;
+    for (int n = 0; n < count; ++n) {
+      surfels.push_back({{random_.bits(), random_.bits(), random_.bits(), random_.bits()}});
+      where.push_back(some[random_.whole(0, cells - 1)]);
+    }
+    Commands& commands = probe_.commands();
+    DeviceArray<cl_uint4> new_surfels(commands);
+    DeviceArray<cl_uint> new_cells(commands), slots(commands);
+    const std::vector<cl_uint> before = {7, 8, 9};
+    new_surfels.write(surfels);
+    new_cells.write(where);
+    slots.write(before);
+    map().reserve(count);
+    map().insert("test", new_surfels, new_cells, count, slots, before.size());
+    EXPECT_TRUE(slots.read(before.size()) == before);
+    check_insertion(surfels, where, count == 0 ? std::vector<cl_uint>() : slots.read(count, before.size()));
+  }
+
+  /// Takes surfels out of the map that is in `pages`; each with a probability.
+  std::set<std::uint32_t> remove(double share) {
+    std::vector<std::uint32_t> slots;
+    for (const auto& [slot, surfel] : book_.surfels)
+      if (random_.chance(share)) slots.push_back(slot);
+    probe_.kill(slots);
+    for (const std::uint32_t slot : slots) book_.surfels.erase(slot);
+    return {slots.begin(), slots.end()};
+  }
+
+  void finish() {
+    map().finish_frame("test", frame_);
+    if (!book_.pages.empty()) last_page_ = std::max(last_page_, book_.pages.rbegin()->first);
+    std::set<std::uint32_t> full;
+    for (const auto& [slot, surfel] : book_.surfels) full.insert(slot / PAGE_SLOTS);
+    for (auto page = book_.pages.begin(); page != book_.pages.end();)
+      page = full.count(page->first) ? std::next(page) : book_.pages.erase(page);
+  }
+
+  /// Every slot of the map is as the book says.
+  void expect_as_in_book() {
+    const std::vector<Surfel> all = map().download();
+    EXPECT_EQ(map().size(), book_.surfels.size());
+    ASSERT_EQ(all.size(), book_.surfels.size());
+    auto expected = book_.surfels.begin();
+    for (std::size_t n = 0; n < all.size(); ++n, ++expected) {
+      ASSERT_EQ(all[n].id, expected->first) << "not by slot";
+      const cl_uint4 packed = probe_.packed(all[n].id);
+      ASSERT_EQ(to_array(packed), expected->second);
+      const BlockKey block = book_.pages.at(all[n].id / PAGE_SLOTS);
+      ASSERT_TRUE(probe_.block_of_slot(all[n].id) == block);
+      Surfel surfel = frontier_surfels::unpack(packed, block, kBlock);
+      surfel.id = all[n].id;
+      EXPECT_TRUE(surfel.position == all[n].position && surfel.label == all[n].label && surfel.rgb == all[n].rgb);
+    }
+  }
+
+  Random& random() { return random_; }
+  std::uint32_t last_page() const { return last_page_; }  ///< that was ever in use
+
+ private:
+  static constexpr double kBlock = 0.5;
+
+  void note(std::uint32_t slot, const Packed& surfel) {
+    EXPECT_TRUE(book_.surfels.emplace(slot, surfel).second) << "slot " << slot << " was not free";
+    book_.pages[slot / PAGE_SLOTS] = probe_.block_of_slot(slot);
+  }
+
+  /// Each block's new surfels take, in their order, its pages' free slots, lowest first, then those of new pages that nobody has.
+  void check_insertion(const std::vector<cl_uint4>& surfels, const std::vector<cl_uint>& where, const std::vector<cl_uint>& slots) {
+    std::map<cl_uint, std::vector<std::size_t>> by_cell;
+    for (std::size_t n = 0; n < where.size(); ++n) by_cell[where[n]].push_back(n);
+    Book after = book_;
+    for (const auto& [cell, numbers] : by_cell) {
+      const BlockKey block = map().window().block(static_cast<int>(cell));
+      std::size_t free = 0, fresh = 0;
+      for (const auto& [page, of] : book_.pages)
+        if (of == block) free += book_.free_slots(page).size();
+      std::uint32_t page = ~0U;
+      std::vector<std::uint32_t> left;
+      for (const std::size_t n : numbers) {
+        if (left.empty() || slots[n] / PAGE_SLOTS != page) {
+          EXPECT_TRUE(left.empty()) << "free slots are left in page " << page;
+          page = slots[n] / PAGE_SLOTS;
+          const auto known = book_.pages.find(page);
+          if (known == book_.pages.end()) {
+            fresh += PAGE_SLOTS;
+            EXPECT_TRUE(after.pages.emplace(page, block).second) << "page " << page << " is given twice";
+          } else {
+            EXPECT_EQ(fresh, 0u) << "new pages come last";
+            EXPECT_TRUE(known->second == block) << "page " << page << " is another block's";
+          }
+          left = book_.free_slots(page);
+        }
+        ASSERT_FALSE(left.empty());
+        EXPECT_EQ(slots[n], left.front());
+        left.erase(left.begin());
+        after.surfels[slots[n]] = to_array(surfels[n]);
+      }
+      const std::size_t missing = numbers.size() > free ? numbers.size() - free : 0;
+      EXPECT_EQ(fresh, (missing + PAGE_SLOTS - 1) / PAGE_SLOTS * PAGE_SLOTS);
+    }
+    EXPECT_EQ(after.surfels.size(), book_.surfels.size() + surfels.size());
+    book_ = after;
+  }
+
+  Camera camera_ = make_camera(33, 17, 22.7, 20.1, 64);
+  Random random_;
+  Eigen::Isometry3d pose_ = Random(9).pose(2, 3);
+  StagesProbe probe_;
+  Book book_;
+  std::vector<cl_uint> cells_;  ///< that surfels of the grid may be in
+  std::uint32_t frame_ = 0, last_page_ = 0;
+};
+
+TEST(StageMapPages, InsertedSurfelsTakeFreeSlotsInOrder) {
+  for (const int there : {0, 1, 3000})
+    for (const int count : {0, 1, 63, 64, 65, 5000}) {
+      SCOPED_TRACE(std::to_string(there) + " surfels and " + std::to_string(count) + " more");
+      Pages pages(static_cast<unsigned>(there + count));
+      pages.fill(there);
+      pages.remove(0.3);
+      pages.open_window(4);
+      pages.insert(count, 40);
+      pages.insert(count / 3, 5);
+      pages.expect_as_in_book();
+    }
+}
+
+TEST(StageMapPages, ThousandsIntoOneBlock) {
+  Pages pages(1);
+  pages.fill(500);
+  pages.open_window(4);
+  for (const int count : {64, 1, 4000, 130}) pages.insert(count, 1);
+  pages.expect_as_in_book();
+}
+
+/// More than the map had room for.
+TEST(StageMapPages, ManyPages) {
+  Pages pages(2);
+  pages.fill(0);
+  pages.open_window(4);
+  pages.insert(small_tests() ? 2000 : 150000, 60);
+  pages.insert(small_tests() ? 2000 : 150000, 60);
+  pages.expect_as_in_book();
+}
+
+TEST(StageMapPages, EmptyPagesAreFreedAndUsedAgain) {
+  Pages pages(3);
+  pages.fill(2000);
+  std::size_t most = pages.book().pages.size();
+  for (int frame = 2; frame < 12; ++frame) {
+    SCOPED_TRACE("frame " + std::to_string(frame));
+    pages.open_window(frame);
+    pages.insert(1500, 20);
+    most = std::max(most, pages.book().pages.size());
+    pages.remove(frame % 3 == 0 ? 1 : 0.9);
+    pages.finish();
+    pages.expect_as_in_book();
+  }
+  EXPECT_LT(pages.last_page(), most) << "pages pile up";
+}
+
+/// All that a frame changed, exactly; and all that frames before it did, page by page.
+TEST(StageMapPages, ChangesAreTold) {
+  Pages pages(4);
+  pages.fill(3000);
+  std::vector<std::map<std::uint32_t, Packed>> books = {{}, pages.book().surfels};
+  for (std::uint32_t frame = 2; frame < 8; ++frame) {
+    pages.open_window(frame);
+    if (frame != 5) pages.insert(100, 3);
+    pages.finish();
+    books.push_back(pages.book().surfels);
+    std::set<std::uint32_t> told, expected;
+    const Changes exact = pages.map().last_changes();
+    EXPECT_TRUE(exact.removed.empty());
+    for (const Surfel& surfel : exact.updated) told.insert(surfel.id);
+    for (const auto& [slot, surfel] : books[frame])
+      if (books[frame - 1].count(slot) == 0) expected.insert(slot);
+    EXPECT_TRUE(told == expected) << "frame " << frame << ": " << told.size() << " are told of " << expected.size();
+  }
+  const auto pages_of = [](const std::vector<std::uint32_t>& slots) {
+    std::set<std::uint32_t> pages;
+    for (const std::uint32_t slot : slots) pages.insert(slot / PAGE_SLOTS);
+    return pages;
+  };
+  for (std::uint32_t since = 0; since < books.size(); ++since) {
+    SCOPED_TRACE("since " + std::to_string(since));
+    std::vector<std::uint32_t> changed, told, gone;
+    for (const auto& [slot, surfel] : books.back())
+      if (books[since].count(slot) == 0) changed.push_back(slot);
+    const Changes changes = pages.map().changes(since);
+    for (const Surfel& surfel : changes.updated) told.push_back(surfel.id);
+    EXPECT_TRUE(std::includes(told.begin(), told.end(), changed.begin(), changed.end()));
+    EXPECT_TRUE(pages_of(told) == pages_of(changed)) << "other pages are told";
+    EXPECT_EQ(told.size() + changes.removed.size(), PAGE_SLOTS * pages_of(changed).size()) << "of a page all slots are told";
+    for (const std::uint32_t slot : changes.removed) EXPECT_EQ(books.back().count(slot), 0u);
+  }
+}
+
+TEST(StageMapPages, SlotsDoNotDependOnThreads) {
+  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end())
+    GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
+  Config one;
+  one.platform = test_platform();
+  one.threads = 1;
+  Commands one_thread(choose_device(one));
+  std::vector<Book> books;
+  for (Commands* with : {&test_commands(), &one_thread}) {
+    Pages pages(5, *with);
+    pages.fill(2000);
+    for (int frame = 2; frame < 6; ++frame) {
+      pages.open_window(frame);
+      pages.insert(3000, 30);
+      pages.remove(0.8);
+      pages.finish();
+    }
+    books.push_back(pages.book());
+  }
+  EXPECT_TRUE(books[0].surfels == books[1].surfels);
+  EXPECT_TRUE(books[0].pages == books[1].pages);
+}
+
+/// Pages near the window are listed once; the others, well beyond, are not.
+TEST(StageMapPages, PagesNearTheWindow) {
+  Pages pages(6);
+  pages.fill(0);
+  std::vector<Surfel> surfels(20000);
+  for (Surfel& surfel : surfels) {
+    for (int axis = 0; axis < 3; ++axis) surfel.position[axis] = static_cast<float>(pages.random().uniform(-20, 20));
+    surfel.radius = 0.01F;
+  }
+  pages.map().replace(surfels, 1);
+  pages.open_window(2);
+  const Window& window = pages.map().window().window();
+  for (const double distance : {0.0, 0.3, 5.0}) {
+    DeviceArray<cl_uint> list(pages.probe().commands());
+    const std::size_t count = pages.map().list_pages_near(distance, list);
+    const std::vector<cl_uint> listed = list.read(count);
+    const std::set<std::uint32_t> near(listed.begin(), listed.end());
+    EXPECT_EQ(near.size(), count);
+    std::size_t inside = 0, outside = 0;
+    for (const Surfel& surfel : pages.map().download()) {
+      const double size = window.block_size;
+      const Eigen::AlignedBox3d box(
+          size * Eigen::Vector3d(window.origin_x, window.origin_y, window.origin_z),
+          size * Eigen::Vector3d(window.origin_x + window.size_x, window.origin_y + window.size_y, window.origin_z + window.size_z));
+      const Eigen::Vector3d p = surfel.position.cast<double>();
+      const bool is_listed = near.count(surfel.id / PAGE_SLOTS) > 0;
+      const double off = (p - p.cwiseMax(box.min()).cwiseMin(box.max())).cwiseAbs().maxCoeff();
+      const bool must = off <= distance;
+      const bool must_not = off > distance + size;
+      inside += must;
+      outside += must_not;
+      EXPECT_TRUE(is_listed ? !must_not : !must) << p.transpose();
+    }
+    EXPECT_GT(inside, 10u);
+    EXPECT_GT(outside, 10u);
+  }
+}
+
+}  // namespace
+}  // namespace frontier_surfels
