@@ -53,6 +53,7 @@ class Stages {
   void list_candidates();  ///< and the direction to the observed space around each
   void set_grid(const WorkingImage& image);
   void allocate_grid();
+  cl::NDRange word_range() const;   ///< a work item for each word, by i, w and j
   std::size_t large_group() const;  ///< work items of a group where one item has much to do
   View own_view() const;            ///< this frame's, as the camera itself sees it
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level = 0);
