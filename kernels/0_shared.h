@@ -21,6 +21,9 @@ namespace frontier_surfels {
 #define VIEW_TILE 8
 #define VIEW_TILE_K 16
 
+// So many views can be kept at most.
+#define MOST_VIEWS 1024
+
 // Side of the blocks of a view's image whose largest depth is known [pixel].
 #define VIEW_BLOCK 8
 

@@ -21,7 +21,7 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
   column_end[pixel] = d > 0.0f ? low : 0;
 }
 
-// One work item a word: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid pixel's ray has its sample of
+// One work item a word, dimensions i, w and j: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid pixel's ray has its sample of
 // that layer in it, that is, iff there is one in a fixed rectangle of the image.
 //   in  column_end[height][width];  valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
 //       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies
@@ -29,9 +29,8 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
 //   out observed: bit field
 __kernel void observed_space(const Grid g, __global const int* column_end, __global const int* valid_above,
                              __global const ushort2* pixels_i, __global const ushort2* pixels_j, __global ulong* observed) {
-  const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k) return;
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const int i = get_global_id(0), w = get_global_id(1), j = get_global_id(2);
+  if (i >= g.size_i) return;
 
   ulong bits = 0;
   const int s = i - g.padding_i, t = j - g.padding_j;
@@ -48,7 +47,7 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
     __global const int* bottom = valid_above + row.y * stride;
     if (bottom[column.y] - bottom[column.x] - top[column.y] + top[column.x] > 0) bits |= 1ul << (k - 64 * w);
   }
-  observed[word] = bits & valid_layers(&g, w);
+  observed[word_index(&g, i, j, w)] = bits & valid_layers(&g, w);
 }
 
 // Exact membership in the space that one view has seen (its pixel there is valid and lies deeper).

@@ -139,13 +139,13 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
   vstore16(sum.z, 3 * chunk + 2, directions);
 }
 
-// One work item a word.
+// One work item a word, dimensions i, w and j.
 //   in  observed: C~;  occupied_voxels: those of surviving surfels;   out candidates
 __kernel void find_candidates(const Grid g, __global const ulong* observed, __global const ulong* occupied_voxels,
                               __global ulong* candidates) {
-  const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k) return;
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const int i = get_global_id(0), w = get_global_id(1), j = get_global_id(2);
+  if (i >= g.size_i) return;
+  const int word = word_index(&g, i, j, w);
   const ulong here = observed[word];
   ulong beside = (here << 1) | (here >> 1);
   if (w > 0) beside |= observed[word_index(&g, i, j, w - 1)] >> 63;

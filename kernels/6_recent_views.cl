@@ -89,18 +89,11 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
   return bits;
 }
 
-// A tile's candidates: VIEW_TILE_K bits of the word of each of its columns, read as 16-bit numbers.
-INLINE __global ushort* tile_column(const Grid* g, __global ushort* candidates, int3 tile, int column) {
-  const int i = tile.x * VIEW_TILE + column % VIEW_TILE, j = tile.y * VIEW_TILE + column / VIEW_TILE;
-  if (i >= g->size_i || j >= g->size_j) return 0;
-  return candidates + 4 * word_index(g, i, j, tile.z / 4) + tile.z % 4;
-}
-
-// Which of LANES candidates of a tile are known to one of its views. Their centres lie on lines a + z b, in the camera's frame and in
+// Which of LANES candidates of a tile are known to one of some views. Their centres lie on lines a + z b, in the camera's frame and in
 // every view's.
-//   entries: VIEW_TILE_K column + layer;  asked: -1 where there is one
-int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, int view_groups,
-                   __global const ushort* tile_views, __global const float* depths, int16 entries, int16 asked) {
+//   entries: VIEW_TILE_K column + layer;  asked: -1 where there is one;  numbers[count]: of the views
+int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __local const ushort* numbers,
+                   int count, __global const float* depths, int16 entries, int16 asked) {
   const int16 column = entries / VIEW_TILE_K, k = tile.z * VIEW_TILE_K + entries % VIEW_TILE_K;
   const float16 c_i = convert_float16(tile.x * VIEW_TILE + column % VIEW_TILE) - g->center_i;
   const float16 c_j = convert_float16(tile.y * VIEW_TILE + column / VIEW_TILE) - g->center_j;
@@ -109,67 +102,118 @@ int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, 
   const float16 base_x = pyramid ? 0.0f : c_i * g->z_min / g->fx, base_y = pyramid ? 0.0f : c_j * g->z_min / g->fy;
   const float16 ray_x = pyramid ? c_i / g->fx : 0.0f, ray_y = pyramid ? c_j / g->fy : 0.0f;
   int16 open = asked;
-  for (int group = 0; group < view_groups; ++group) {
-    for (uint left = tile_views[group]; left != 0; left &= left - 1) {
-      const View view = views[group * LANES + lowest_lane(left)];
-      const Transform T = view.T_camera_world;
-      const float16 x = T.r00 * base_x + T.r01 * base_y + T.t0 + z * (T.r00 * ray_x + T.r01 * ray_y + T.r02);
-      const float16 y = T.r10 * base_x + T.r11 * base_y + T.t1 + z * (T.r10 * ray_x + T.r11 * ray_y + T.r12);
-      const float16 q = T.r20 * base_x + T.r21 * base_y + T.t2 + z * (T.r20 * ray_x + T.r21 * ray_y + T.r22);
-      open &= ~knows(&view, depths, x, y, q, open);
-      if (lane_bits(open) == 0) return asked;
-    }
+  for (int n = 0; n < count && lane_bits(open) != 0; ++n) {
+    const View view = views[numbers[n]];
+    const Transform T = view.T_camera_world;
+    const float16 x = T.r00 * base_x + T.r01 * base_y + T.t0 + z * (T.r00 * ray_x + T.r01 * ray_y + T.r02);
+    const float16 y = T.r10 * base_x + T.r11 * base_y + T.t1 + z * (T.r10 * ray_x + T.r11 * ray_y + T.r12);
+    const float16 q = T.r20 * base_x + T.r21 * base_y + T.t2 + z * (T.r20 * ray_x + T.r21 * ray_y + T.r22);
+    open &= ~knows(&view, depths, x, y, q, open);
   }
   return asked & ~open;
 }
 
+#define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
+
+// Number, in units of VIEW_TILE_K bits, of a tile's part of a bit field's column; -1 beyond the grid.
+INLINE int column_bits(const Grid* g, int3 tile, int column) {
+  const int i = tile.x * VIEW_TILE + column % VIEW_TILE, j = tile.y * VIEW_TILE + column / VIEW_TILE;
+  return i < g->size_i && j < g->size_j ? 4 * word_index(g, i, j, tile.z / 4) + tile.z % 4 : -1;
+}
+
+// What a work-group knows of its tile.
+typedef struct {
+  uint open[TILE_COLUMNS];  // layers with a candidate
+  uint layers;              // those of all columns
+  ushort entries[TILE_COLUMNS * VIEW_TILE_K + LANES], settled[TILE_COLUMNS];  // the candidates; those of each chunk that are settled
+  uint entry_count;
+  ushort views[MOST_VIEWS];
+  uint view_count;
+} Tile;
+
+// Lists a tile's candidates. One work item does it.
+INLINE void list_entries(__local Tile* tile) {
+  uint count = 0, layers = 0;
+  for (int column = 0; column < TILE_COLUMNS; ++column) {
+    layers |= tile->open[column];
+    for (uint left = tile->open[column]; left != 0; left &= left - 1)
+      tile->entries[count++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
+  }
+  tile->entry_count = count;
+  tile->layers = layers;
+}
+
+// Takes those off the list that are settled. One work item does it.
+INLINE void drop_settled(__local Tile* tile) {
+  uint count = 0;
+  for (uint first = 0; first < tile->entry_count; first += LANES) {
+    uint left = ~(uint)tile->settled[first / LANES] & ((1u << min(tile->entry_count - first, (uint)LANES)) - 1);
+    for (; left != 0; left &= left - 1) tile->entries[count++] = tile->entries[first + lowest_lane(left)];
+  }
+  tile->entry_count = count;
+}
+
+// Lists the views that may know something near a tile's candidates, newest first. One work item does it.
+INLINE void list_views(__local Tile* tile, __global const ushort* tile_views, int view_groups) {
+  uint count = 0;
+  for (int group = 0; group < view_groups; ++group)
+    for (uint left = tile_views[group]; left != 0; left &= left - 1) tile->views[count++] = (ushort)(group * LANES + lowest_lane(left));
+  tile->view_count = count;
+}
+
 // One work-group a tile of VIEW_TILE x VIEW_TILE columns and VIEW_TILE_K layers.
 //   in  views[view_groups * LANES]: T_camera_world is from this frame's camera to the view's;  view_lanes: the same, by lanes;  depths:
-//       their images;  block_depths: the
-//       largest depth of each block of them;  layer_depth[size_k]
+//       their images;  block_depths: the largest depth of each block of them;  layer_depth[size_k]
 //   out tile_views[tiles][view_groups]: a bit for each view that may know something near a candidate of the tile
-//   i/o candidates: those that a view knows are cleared
+//   i/o candidates: those that a view knows are cleared; VIEW_TILE_K bits each
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
                                 const int view_groups, __global const float* depths, __global const float* block_depths,
                                 __global const float* layer_depth, __global ushort* tile_views, __global ushort* candidates) {
   const int number = get_group_id(0), lane = get_local_id(0), lanes = get_local_size(0);
   const int tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 4 * g.words_k;
-  const int3 tile = (int3)(number % tiles_i, number / tiles_i / tiles_k, number / tiles_i % tiles_k);
-  __local uint open[VIEW_TILE * VIEW_TILE];  // the layers of each column
-  __local ushort entries[VIEW_TILE * VIEW_TILE * VIEW_TILE_K + LANES];
-  __local uint layers, count;
-  if (lane == 0) layers = count = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (int column = lane; column < VIEW_TILE * VIEW_TILE; column += lanes) {
-    __global const ushort* bits = tile_column(&g, candidates, tile, column);
-    open[column] = bits != 0 ? *bits : 0;
-    if (open[column] == 0) continue;
-    atomic_or(&layers, open[column]);
-    uint at = atomic_add(&count, popcount(open[column]));
-    for (uint left = open[column]; left != 0; left &= left - 1) entries[at++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
+  const int3 at = (int3)(number % tiles_i, number / tiles_i / tiles_k, number / tiles_i % tiles_k);
+  __local Tile tile;
+  for (int column = lane; column < TILE_COLUMNS; column += lanes) {
+    const int bits = column_bits(&g, at, column);
+    tile.open[column] = bits < 0 ? 0 : candidates[bits];
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (count == 0) return;
+  if (lane == 0) list_entries(&tile);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (tile.layers == 0) return;
 
-  const Box box = tile_box(&g, layer_depth, tile.x, tile.y, tile.z * VIEW_TILE_K + lowest_lane(layers),
-                           tile.z * VIEW_TILE_K + 31 - (int)clz(layers), min_gap);
+  const int first_layer = at.z * VIEW_TILE_K;
+  const Box box = tile_box(&g, layer_depth, at.x, at.y, first_layer + lowest_lane(tile.layers),
+                           first_layer + 31 - (int)clz(tile.layers), min_gap);
   __global ushort* own_views = tile_views + number * view_groups;
   for (int group = lane; group < view_groups; group += lanes)
     own_views[group] = (ushort)views_of_box(view_lanes + group * VIEW_LANE_FIELDS * LANES, views + group * LANES, block_depths, &box);
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-
-  for (uint first = lane * LANES; first < count; first += lanes * LANES) {
-    const int16 chunk = convert_int16(vload16(0, entries + first)), asked = lane_numbers() < (int)(count - first);
-    const int16 settled = find_settled(&g, tile, layer_depth, views, view_groups, own_views, depths, asked ? chunk : 0, asked);
-    for (uint left = lane_bits(settled); left != 0; left &= left - 1) {
-      const int entry = entries[first + lowest_lane(left)];
-      atomic_and(&open[entry / VIEW_TILE_K], ~(1u << entry % VIEW_TILE_K));
-    }
-  }
+  if (lane == 0) list_views(&tile, own_views, view_groups);
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (int column = lane; column < VIEW_TILE * VIEW_TILE; column += lanes) {
-    __global ushort* bits = tile_column(&g, candidates, tile, column);
-    if (bits != 0) *bits = (ushort)open[column];
+
+  // The newest views settle most; those left are listed anew before more views are asked, so that vectors have few lanes to spare.
+  for (uint first = 0, count = 1; first < tile.view_count && tile.entry_count != 0; first += count, count *= 2) {
+    const int entries = tile.entry_count, asked_views = min(count, tile.view_count - first);
+    for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
+      const int16 asked = lane_numbers() < entries - chunk * LANES;
+      const int16 candidate = asked ? convert_int16(vload16(chunk, tile.entries)) : 0;
+      tile.settled[chunk] =
+          (ushort)lane_bits(find_settled(&g, at, layer_depth, views, tile.views + first, asked_views, depths, candidate, asked));
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane == 0) drop_settled(&tile);
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+
+  for (int column = lane; column < TILE_COLUMNS; column += lanes) tile.open[column] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (lane == 0)
+    for (uint n = 0; n < tile.entry_count; ++n) tile.open[tile.entries[n] / VIEW_TILE_K] |= 1u << tile.entries[n] % VIEW_TILE_K;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int column = lane; column < TILE_COLUMNS; column += lanes) {
+    const int bits = column_bits(&g, at, column);
+    if (bits >= 0) candidates[bits] = (ushort)tile.open[column];
   }
 }
 

@@ -59,6 +59,7 @@ struct Mapper::Impl {
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
+  bool unfinished = false;                ///< the last frame failed
   bool blocks_moved = false;          ///< to or from the archive, since the last frame
 };
 
@@ -81,6 +82,11 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // The working image and its grid - 3.1, eq. (2)-(3)
   const WorkingImage image = make_working_image(frame, config);
   frame_on_device = 0;
+  if (unfinished) {  // a frame failed half way, but may have split surfels: older changes tell of it
+    stages.finish_frame();
+    blocks_moved = true;
+  }
+  unfinished = true;
   if (archive && archive->follow(frame.T_world_camera.translation(), static_cast<std::uint32_t>(report.sequence))) blocks_moved = true;
   stages.begin_frame(image, frame.T_world_camera, static_cast<std::uint32_t>(report.sequence));
 
@@ -116,6 +122,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // Labels and colour - 3.5
   stages.label_surfels();
   const std::vector<BlockKey> emptied = stages.finish_frame();
+  unfinished = false;
 
   if (archive) archive->save_some(emptied, static_cast<std::uint32_t>(report.sequence));
   report.view_kept = views.keep_current();

@@ -129,11 +129,16 @@ View Stages::own_view() const {
   return own;
 }
 
+cl::NDRange Stages::word_range() const {
+  return {(grid_.size_i + kGroup - 1) / kGroup * kGroup, static_cast<std::size_t>(grid_.words_k), static_cast<std::size_t>(grid_.size_j)};
+}
+
 void Stages::observe_space() {
   const char* stage = "observed_space";
   commands_.run(stage, "column_ends", static_cast<std::size_t>(grid_.width) * grid_.height, kGroup, grid_, depth_(), layer_depth_(),
                 column_end_());
-  commands_.run(stage, "observed_space", words(), kGroup, grid_, column_end_(), valid_above_(), pixels_i_(), pixels_j_(), observed_());
+  commands_.run(stage, "observed_space", word_range(), cl::NDRange(kGroup, 1, 1), grid_, column_end_(), valid_above_(), pixels_i_(),
+                pixels_j_(), observed_());
 }
 
 std::size_t Stages::select_in_view() {
@@ -229,7 +234,8 @@ void Stages::mark_removed() {
 }
 
 void Stages::find_candidates() {
-  commands_.run("candidates", "find_candidates", words(), kGroup, grid_, observed_(), occupied_voxels_(), candidates_());
+  commands_.run("candidates", "find_candidates", word_range(), cl::NDRange(kGroup, 1, 1), grid_, observed_(), occupied_voxels_(),
+                candidates_());
 }
 
 void Stages::settle_by_recent_views() {
@@ -237,8 +243,7 @@ void Stages::settle_by_recent_views() {
   const int count = views_.prepare();
   if (count > 0) {
     const auto up = [](int size) { return static_cast<std::size_t>((size + VIEW_TILE - 1) / VIEW_TILE); };
-    const std::size_t tiles = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k * (64 / VIEW_TILE_K);
-    const std::size_t group = large_group();
+    const std::size_t tiles = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k * (64 / VIEW_TILE_K), group = large_group();
     tile_views_.resize(tiles * views_.view_groups());
     commands_.run(stage, "settle_candidates", tiles * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
                   static_cast<cl_int>(views_.view_groups()), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(),

@@ -54,6 +54,7 @@ class Stages {
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   void allocate_paths();
+  cl::NDRange word_range() const;   ///< a work item for each word, by i, w and j
   std::size_t large_group() const;  ///< work items of a group where one item has much to do
   View own_view() const;            ///< this frame's, as the camera itself sees it
 

@@ -11,9 +11,19 @@ namespace {
 
 using namespace reference;
 
+/// An image of a wall, a little rough and with holes: unlike random depths it hides what is behind, so that tiles need not ask the view.
+WorkingImage wall_image(const Camera& camera, Random& random) {
+  WorkingImage image = random_image(camera, Content::all_invalid, random);
+  const double distance = random.uniform(camera.config.z_min, 1.2 * camera.config.z_max);
+  for (float& d : image.depth)
+    if (random.chance(0.9)) d = static_cast<float>(distance * random.uniform(0.98, 1.02)) * (random.chance(0.1) ? -1.0F : 1.0F);
+  return image;
+}
+
 /// @param frames  views before the current one, of which the last config.recent_views are kept
+/// @param walls   those views see walls, from anywhere around
 /// @return share of candidates that a view knows
-double check(Camera camera, int frames, int kept, Content content, double density) {
+double check(Camera camera, int frames, int kept, Content content, double density, bool walls = false) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(frames) + " frames, " + std::to_string(kept) + " views kept, density " +
                std::to_string(density));
   camera.config.recent_views = kept;
@@ -22,7 +32,8 @@ double check(Camera camera, int frames, int kept, Content content, double densit
   std::vector<SeenView> views;
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
   for (int frame = 0; frame < frames; ++frame) {
-    views.push_back({random_image(camera, content, random), T_world_start * random.pose(0.5, 0.6)});
+    views.push_back({walls ? wall_image(camera, random) : random_image(camera, content, random),
+                     T_world_start * (walls ? random.pose(0.8 * camera.config.z_max, M_PI) : random.pose(0.5, 0.6))});
     probe.views().set_current(views.back().image, views.back().T_world_camera);
     EXPECT_EQ(probe.views().keep_current(), kept > 0);
   }
@@ -61,6 +72,15 @@ TEST(StageRecentViews, FewCandidates) {
 }
 
 TEST(StageRecentViews, EveryVoxelIsACandidate) { check(cameras().front(), 3, 10, Content::all_valid, 1); }
+
+/// More views than a vector has lanes, most of which can know nothing of most tiles, and say so.
+TEST(StageRecentViews, ViewsOfWallsFromAnywhere) {
+  double known = 0;
+  for (const Camera& camera : cameras())
+    for (const double density : {0.002, 0.2})
+      for (const int frames : {15, 16, 17, 40}) known = std::max(known, check(camera, frames, 40, Content::mixed, density, true));
+  EXPECT_GT(known, 0.1) << "nothing was tested";
+}
 
 TEST(StageRecentViews, NoCandidates) { check(cameras().front(), 3, 10, Content::all_valid, 0); }
 
