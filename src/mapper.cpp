@@ -59,7 +59,7 @@ struct Mapper::Impl {
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
-  bool unfinished = false;                ///< the last frame failed
+  bool unfinished = false;            ///< the last frame failed
   bool blocks_moved = false;          ///< to or from the archive, since the last frame
 };
 

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMostWaiting = 4;                                           // pushes; then no more are wanted
 constexpr std::uint32_t kUpdatesQueue = 50, kMarkersQueue = 20, kCloudQueue = 1;  // messages, for a slow subscriber
 constexpr int kNiceness = 10;                                                     // the mapping itself comes first
-constexpr double kShare = 0.1;   // of a core, for publishing at most: who sends and who receives a large map take as much again
+constexpr double kShare = 0.1;  // of a core, for publishing at most: who sends and who receives a large map take as much again
 
 /// Of a single thread, as Linux has it. A refusal does no harm.
 void set_niceness(int thread_id, int niceness) { setpriority(PRIO_PROCESS, static_cast<id_t>(thread_id), niceness); }

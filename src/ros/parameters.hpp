@@ -37,7 +37,8 @@ void for_each_node_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"color_transport", "", "of the colour images: raw, compressed, or any other that is installed"}, config.color_transport);
   visit(FieldInfo{"tf_timeout", "s", "how long an image waits for its pose", 0, 10}, config.tf_timeout);
   visit(FieldInfo{"on_time_jump", "", "when time goes back, as with a looping bag: keep or reset the map"}, config.on_time_jump);
-  visit(FieldInfo{"publish_period", "s", "whole clouds and markers are published at most this often; large maps less often", 0.05, 3600}, config.publish_period);
+  visit(FieldInfo{"publish_period", "s", "whole clouds and markers are published at most this often; large maps less often", 0.05, 3600},
+        config.publish_period);
   visit(FieldInfo{"marker_limit", "surfel", "discs shown by ~markers; beyond that they are merged to larger ones", 100, 10000000},
         config.marker_limit);
 }
