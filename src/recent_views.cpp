@@ -68,8 +68,8 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   if (image.depth.size() > room_pixels_ || blocks.size() > room_blocks_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
     const std::size_t most_pixels = std::max(image.depth.size(), room_pixels_), most_blocks = std::max(blocks.size(), room_blocks_);
-    depths_.resize((config_.recent_views + 1) * most_pixels);
-    block_depths_.resize((config_.recent_views + 1) * most_blocks);
+    depths_.allocate((config_.recent_views + 1) * most_pixels);
+    block_depths_.allocate((config_.recent_views + 1) * most_blocks);
     clear(kept_.empty() && complete_);
     room_pixels_ = most_pixels;
     room_blocks_ = most_blocks;

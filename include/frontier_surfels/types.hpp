@@ -112,8 +112,8 @@ struct Report {
   std::size_t in_view = 0;     ///< surfels that touched the view's grid
   std::size_t created = 0;
   std::size_t removed = 0;
-  std::size_t split = 0;          ///< surfels that splitting has added: surfels = those before + split + created - removed
-  std::size_t map_bytes = 0;      ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
+  std::size_t split = 0;      ///< surfels that splitting has added: surfels = those before + split + created - removed
+  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
   std::size_t device_bytes = 0;   ///< all buffers on the device, the map's included
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
@@ -125,7 +125,7 @@ struct Statistics {
   std::size_t surfels = 0;
   std::size_t occupied = 0;
   std::size_t frontier = 0;
-  std::size_t map_bytes = 0;     ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
+  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
   std::size_t device_bytes = 0;  ///< all buffers on the device, the map's included
 };
 

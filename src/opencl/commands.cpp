@@ -54,8 +54,8 @@ std::vector<StageTime> Commands::take_times() {
 
 cl::Buffer Commands::allocate(std::size_t bytes) {
   if (bytes > most_bytes_)
-    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " + std::to_string(most_bytes_ >> 20) +
-                      " MiB; raise decimation, lower z_max or choose another device.");
+    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
+                      std::to_string(most_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
   cl::Buffer buffer(device_.context, CL_MEM_READ_WRITE, bytes);
   allocated_bytes_ += bytes;
   return buffer;
