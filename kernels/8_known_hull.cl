@@ -63,22 +63,16 @@ INLINE uint face_key(float position, int size, float entering, float th_d, bool 
   return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
 }
 
-// One work item a slot of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own reach
-// as a margin), enter it.
-//   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
-__kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
-                           __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
-                           __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
-  const uint item = get_global_id(0);
-  if (item >= PAGE_SLOTS * count) return;
-  const uint slot = PAGE_SLOTS * pages[item / PAGE_SLOTS] + item % PAGE_SLOTS;
-  if (!is_alive(alive, slot)) return;
-  const ViewSurfel s = place_slot(&g, &window, &T_camera_local, surfels, page_block, slot);
-  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits.th_d, s.ragged != 0),
-             key_j = face_key(s.j, g.size_j, s.n_y, limits.th_d, s.ragged != 0);
-  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits.th_d, s.ragged != 0);
+// Enters a surfel into the faces that it is beyond.
+INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfel* surfel, __global const uint* lines,
+                         __global uint* faces) {
+  const Grid g = *grid;
+  const ViewSurfel s = *surfel;
+  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits->th_d, s.ragged != 0),
+             key_j = face_key(s.j, g.size_j, s.n_y, limits->th_d, s.ragged != 0);
+  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits->th_d, s.ragged != 0);
   const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
-  const float unknown = limits.hull_unknown_scale;
+  const float unknown = limits->hull_unknown_scale;
   if (key_i != HULL_EMPTY)
     stamp_face(faces + face_offset(&g, s.i < 0.0f ? FACE_I_LOW : FACE_I_HIGH), g.size_k, g.size_j, (float2)(s.k, s.j),
                axes.zy * (key_i & 1 ? 1.0f : unknown), key_i, lines + lines_i(&g, 0, 0), true, 2 * g.words_k);
@@ -88,6 +82,31 @@ __kernel void project_hull(const Grid g, const Limits limits, const Window windo
   if (key_k != HULL_EMPTY)
     stamp_face(faces + face_offset(&g, s.k < 0.0f ? FACE_K_LOW : FACE_K_HIGH), g.size_i, g.size_j, (float2)(s.i, s.j),
                axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
+}
+
+// One work item eight slots of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own
+// reach as a margin), enter it.
+//   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
+__kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
+                           __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
+                           __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
+  const uint item = get_global_id(0);
+  if (item >= PAGE_SLOTS / 8 * count) return;
+  const uint page = pages[item / (PAGE_SLOTS / 8)], first = PAGE_SLOTS * page + 8 * (item % (PAGE_SLOTS / 8));
+  const uint lanes = (uint)(alive[page] >> (first % PAGE_SLOTS)) & 0xff;
+  if (lanes == 0) return;
+  const Surfels8 s = load_eight(&window, &T_camera_local, surfels, page_block[page], first);
+  int8 i, j, k;
+  voxels_of_eight(&g, s.x, s.y, s.z, &i, &j, &k);
+  const int8 reach = convert_int8(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.z, g.z_min)) + 2;
+  const int8 near_i = i >= -reach && i < g.size_i + reach, near_j = j >= -reach && j < g.size_j + reach;
+  const int8 near_k = k >= -reach && k < g.size_k + reach;
+  const int8 beyond = ((i < 0 || i >= g.size_i) && near_j && near_k) || ((j < 0 || j >= g.size_j) && near_i && near_k) ||
+                      ((k < 0 || k >= g.size_k) && near_i && near_j);
+  for (uint left = lanes & lanes_of(beyond); left != 0; left &= left - 1) {
+    const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + 31 - (int)clz(left & -left));
+    enter_surfel(&g, &limits, &v, lines, faces);
+  }
 }
 
 // Is the state of a cell known? Not if no surfel was met there or beside it.

@@ -76,6 +76,18 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
   return p.x() > sides[0] - sphere_ && p.x() < sides[1] + sphere_ && p.y() > sides[2] - sphere_ && p.y() < sides[3] + sphere_;
 }
 
+std::vector<BlockKey> MapWindow::blocks_near(double distance, std::size_t most) const {
+  const int more = static_cast<int>(std::ceil(distance / window_.block_size));
+  const std::size_t size_x = window_.size_x + 2 * more, size_y = window_.size_y + 2 * more, size_z = window_.size_z + 2 * more;
+  std::vector<BlockKey> blocks;
+  if (size_x * size_y * size_z > most) return blocks;
+  for (int z = -more; z < window_.size_z + more; ++z)
+    for (int y = -more; y < window_.size_y + more; ++y)
+      for (int x = -more; x < window_.size_x + more; ++x)
+        blocks.push_back({window_.origin_x + x, window_.origin_y + y, window_.origin_z + z});
+  return blocks;
+}
+
 bool MapWindow::is_near(const BlockKey& block, double distance) const {
   const Eigen::Vector3d low = corner(block), high = low + Eigen::Vector3d::Constant(window_.block_size);
   const Eigen::Vector3d size = Eigen::Vector3d(window_.size_x, window_.size_y, window_.size_z) * window_.block_size;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "0_shared.h"
 #include "block_key.hpp"
@@ -23,6 +24,9 @@ class MapWindow {
 
   /// Could a surfel of this block reach into the grid? Generous.
   bool meets_grid(const BlockKey& block) const;
+
+  /// All blocks, be there surfels or not, within `distance` [m] of the window; none if they are more than `most`.
+  std::vector<BlockKey> blocks_near(double distance, std::size_t most) const;
 
   /// Is the block within `distance` [m] of the window?
   bool is_near(const BlockKey& block, double distance) const;

@@ -206,7 +206,7 @@ void Stages::compute_known_hull() {
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
   hull_faces_.fill(stage, 0xffffffffU, 2 * (j * k + i * k + i * j));
   const std::size_t pages = map_.list_pages_near(kHullReach * config_.z_max, near_pages_);
-  commands_.run(stage, "project_hull", PAGE_SLOTS * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
+  commands_.run(stage, "project_hull", kGroupOfPage * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
                 static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), lines_(), hull_faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), grid_, hull_faces_(),
@@ -221,7 +221,7 @@ void Stages::sweep_paths() {
   commands_.run(stage, "sweep_k", i * j, kGroup, grid_, lines_(), events_(), hull_(), known_());
 }
 
-void Stages::filter_median() { commands_.run("median", "median", words(), kGroup, grid_, limits_, known_(), filtered_()); }
+void Stages::filter_median() { commands_.run("median", "median", words(), kGroup, grid_, limits_, known_(), candidates_(), filtered_()); }
 
 void Stages::mark_removed() {
   const char* stage = "removal";

@@ -95,8 +95,14 @@ void SurfelMap::list_window() {
 
 std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
   std::vector<Page> near;
-  for (const auto& [block, pages] : index_.blocks())
-    if (window_.is_near(block, distance)) near.insert(near.end(), pages.begin(), pages.end());
+  const auto add = [&](const BlockIndex::Pages& pages) { near.insert(near.end(), pages.begin(), pages.end()); };
+  const std::vector<BlockKey> around = window_.blocks_near(distance, index_.blocks().size());
+  for (const BlockKey& block : around)
+    if (const BlockIndex::Pages* pages = index_.find(block)) add(*pages);
+  if (around.empty()) {  // the map has fewer blocks than there are around
+    for (const auto& [block, pages] : index_.blocks())
+      if (window_.is_near(block, distance)) add(pages);
+  }
   list.write(near);
   return near.size();
 }
