@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <set>
 
 #include "stages/reference_observed_space.hpp"
 #include "stages/reference_surfels.hpp"
@@ -167,7 +168,7 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   probe.stages().assume_unknown();
   probe.stages().filter_candidates();
   candidates = probe.created();
-  probe.set_removed_bits(std::vector<std::uint64_t>((probe.in_view() + 63) / 64, 0));
+  probe.set_removed_words(std::vector<std::uint64_t>(probe.window_pages().size(), 0));
   const int words_k = (scene.grid.size_k + 63) / 64;
   for (int j = 0; j < scene.grid.size_j; ++j)
     for (int w = 0; w < words_k; ++w)
@@ -187,15 +188,17 @@ std::size_t check_creation(Camera camera, int old_surfels, double density, bool 
   probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), old_surfels, 2, 2, random), 1);
   if (old_surfels > 10) probe.kill(some_slots(probe.map().download(), 7));
   const Scene scene = prepare(camera, probe, density, random);
-  const std::vector<std::uint32_t> in_view = probe.in_view_slots();
   EXPECT_EQ(probe.stages().remove_surfels(), 0u);
+  const std::vector<Surfel> there = probe.map().download();
   const std::size_t before = probe.map().size();
+  std::set<std::uint32_t> old_slots;
+  for (const Surfel& surfel : there) old_slots.insert(surfel.id);
+  EXPECT_EQ(old_slots.size(), before);
 
   EXPECT_EQ(probe.stages().create_surfels(), scene.voxels.size());
   EXPECT_EQ(probe.map().size(), before + scene.voxels.size());
-  std::vector<std::uint32_t> slots = probe.in_view_slots();
-  EXPECT_TRUE(slots.size() == in_view.size() + scene.voxels.size() && std::equal(in_view.begin(), in_view.end(), slots.begin()));
-  slots.erase(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(in_view.size()));
+  const std::size_t count = scene.voxels.size();
+  const std::vector<std::uint32_t> slots = probe.find_slots(probe.new_surfels(count), probe.new_cells(count), old_slots);
   probe.stages().finish_frame();
   std::map<std::uint32_t, Surfel> by_slot;
   for (const Surfel& surfel : probe.map().last_changes().updated) by_slot[surfel.id] = surfel;

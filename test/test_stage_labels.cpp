@@ -89,7 +89,6 @@ std::size_t check(Camera camera, Content content, int count, bool with_color, do
   const std::vector<Surfel> before = probe.map().download();
   probe.stages().begin_frame(scene.image, scene.T_world_camera, 4);
   probe.stages().observe_space();
-  probe.set_in_view_slots(slots);  // those of dead surfels as well: removed ones are still listed
   probe.stages().label_surfels();
   return compare(scene, probe, before);
 }

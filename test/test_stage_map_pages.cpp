@@ -78,15 +78,28 @@ class Pages {
     }
     Commands& commands = probe_.commands();
     DeviceArray<cl_uint4> new_surfels(commands);
-    DeviceArray<cl_uint> new_cells(commands), slots(commands);
-    const std::vector<cl_uint> before = {7, 8, 9};
+    DeviceArray<cl_uint> new_cells(commands);
     new_surfels.write(surfels);
     new_cells.write(where);
-    slots.write(before);
     map().reserve(count);
-    map().insert("test", new_surfels, new_cells, count, slots, before.size());
-    EXPECT_TRUE(slots.read(before.size()) == before);
-    check_insertion(surfels, where, count == 0 ? std::vector<cl_uint>() : slots.read(count, before.size()));
+    map().insert("test", new_surfels, new_cells, count);
+    std::set<std::uint32_t> before;
+    for (const auto& [slot, surfel] : book_.surfels) before.insert(slot);
+    check_insertion(surfels, where, probe_.find_slots(surfels, where, before));
+    check_window();
+  }
+
+  /// The window has every page of each cell that may be in the grid, once, cell after cell.
+  void check_window() const {
+    std::vector<std::uint32_t> expected;
+    for (const cl_uint cell : cells_) {
+      const BlockIndex::Pages* pages = probe_.map().index().find(probe_.map().window().block(static_cast<int>(cell)));
+      if (pages != nullptr) expected.insert(expected.end(), pages->begin(), pages->end());
+    }
+    EXPECT_TRUE(probe_.window_pages() == expected);
+    std::size_t in_window = 0;
+    for (const auto& [page, block] : book_.pages) in_window += std::count(expected.begin(), expected.end(), page);
+    EXPECT_EQ(in_window, expected.size()) << "pages that hold nothing";
   }
 
   /// Takes surfels out of the map that is in `pages`; each with a probability.

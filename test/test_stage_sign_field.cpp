@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
 #include <optional>
 
 #include "stages/reference_paths.hpp"
 #include "stages/reference_sign_field.hpp"
+#include "stages/reference_surfels.hpp"
 #include "stages/stages_probe.hpp"
+#include "view_grid.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -43,7 +46,7 @@ ViewSurfel make_view_surfel(const Grid& g, const Limits& limits, const Eigen::Ve
 }
 
 /// Surfels in the grid and around it; some are large, as those beyond the grid are not split.
-std::vector<ViewSurfel> random_surfels(const Grid& g, const Limits& limits, int count, Random& random) {
+std::vector<ViewSurfel> random_view_surfels(const Grid& g, const Limits& limits, int count, Random& random) {
   std::vector<ViewSurfel> surfels;
   for (int n = 0; n < count; ++n) {
     constexpr double kAround = 5;
@@ -75,6 +78,39 @@ void compare(const StagesProbe& probe, const SignField& expected, const Field<ch
 
 using MakeSurfels = std::function<std::vector<ViewSurfel>(const Grid&, const Limits&)>;
 
+/// As the map has it; its camera stands at the origin.
+Surfel to_map(const Nuvg& grid, const ViewSurfel& s) {
+  const Eigen::Vector3d p = grid.from_grid(Eigen::Vector3d(s.i, s.j, s.k));
+  Surfel surfel;
+  surfel.position = p.cast<float>();
+  surfel.normal = Eigen::Vector3f(s.n_x, s.n_y, s.n_z);
+  surfel.radius = static_cast<float>(s.reach / 2 * grid.voxel_size(p.z()));
+  return surfel;
+}
+
+/// @return all surfels, those in view as they are placed: the map rounds them. Those that are not must make no difference.
+std::vector<ViewSurfel> put_into_map(const Camera& camera, StagesProbe& probe, std::vector<ViewSurfel> surfels) {
+  const Nuvg grid(camera.intrinsics, camera.config);
+  Random random(1);
+  std::vector<Surfel> map;
+  for (const ViewSurfel& surfel : surfels) map.push_back(to_map(grid, surfel));
+  const std::vector<std::uint32_t> slots = probe.map().replace(map, 1);
+  std::map<std::uint32_t, ViewSurfel*> by_slot;
+  for (std::size_t n = 0; n < surfels.size(); ++n) {
+    by_slot[slots[n]] = &surfels[n];
+    if (surfels[n].ragged != 0) probe.make_ragged({slots[n]});
+  }
+  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
+  probe.stages().select_in_view();
+  for (const ViewSurfel& placed : probe.place_surfels()) {
+    ViewSurfel& meant = *by_slot.at(placed.slot);
+    EXPECT_LT((Eigen::Vector3d(placed.i, placed.j, placed.k) - Eigen::Vector3d(meant.i, meant.j, meant.k)).norm(), 0.01);
+    EXPECT_EQ(placed.ragged, meant.ragged);
+    meant = placed;
+  }
+  return surfels;
+}
+
 /// @param candidate_density  only the paths around so many voxels are needed; 1: all
 void check(const Camera& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
   SCOPED_TRACE(camera.name);
@@ -83,14 +119,13 @@ void check(const Camera& camera, const MakeSurfels& make_surfels, double candida
     SCOPED_TRACE(commands->device().is_cpu ? "one work item a tile" : "64 work items a tile");
     Random random(1);
     StagesProbe probe(camera.config, *commands);
-    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-    const std::vector<ViewSurfel> surfels = make_surfels(probe.grid(), probe.limits());
-    if (!expected) expected.emplace(probe.grid(), probe.limits(), surfels);
-    const Field<char> candidates = random_field(probe.grid(), candidate_density, random);
+    const Grid grid = make_view_grid(camera.intrinsics, camera.config).grid;
+    const std::vector<ViewSurfel> surfels = put_into_map(camera, probe, make_surfels(grid, probe.limits()));
+    if (!expected) expected.emplace(grid, probe.limits(), surfels);
+    const Field<char> candidates = random_field(grid, candidate_density, random);
     probe.need_paths_around(candidates);
-    probe.set_view_surfels(surfels);
     for (int family = 0; family < 3; ++family)  // what the last frame left must not matter
-      for (int event = 0; event < EVENT_PLANES; ++event) probe.set_event(family, event, random_field(probe.grid(), 0.5, random));
+      for (int event = 0; event < EVENT_PLANES; ++event) probe.set_event(family, event, random_field(grid, 0.5, random));
     probe.stages().compute_sign_field();
     compare(probe, *expected, around(candidates, 1));
   }
@@ -103,7 +138,7 @@ TEST(StageSignField, RandomSurfels) {
       check(camera, [](const Grid& g, const Limits& limits) {
         Random random(2);
         const int voxels = g.size_i * g.size_j * g.size_k;
-        return random_surfels(g, limits, std::clamp(voxels / 400, 60, 200), random);
+        return random_view_surfels(g, limits, std::clamp(voxels / 400, 60, 200), random);
       });
     }
   }
@@ -113,7 +148,7 @@ TEST(StageSignField, AroundFewCandidates) {
   for (const Camera& camera : cameras()) {
     const MakeSurfels make = [](const Grid& g, const Limits& limits) {
       Random random(4);
-      return random_surfels(g, limits, 100, random);
+      return random_view_surfels(g, limits, 100, random);
     };
     check(camera, make, 0.002);
     check(camera, make, 0);

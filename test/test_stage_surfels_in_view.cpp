@@ -41,7 +41,9 @@ struct Scene {
   Eigen::Isometry3d T_world_camera;
   StagesProbe probe;
 
-  Scene(const Camera& with_camera, int count, double around, double largest, unsigned seed, Commands& commands = test_commands())
+  /// @param anywhere  so many more are put around the camera
+  Scene(const Camera& with_camera, int count, double around, double largest, unsigned seed, Commands& commands = test_commands(),
+        int anywhere = 0)
       : camera(with_camera), grid(camera.intrinsics, camera.config), probe(camera.config, commands) {
     Random random(seed);
     T_world_camera = random.pose(2, 3);
@@ -49,9 +51,13 @@ struct Scene {
     while (static_cast<int>(surfels.size()) < count)
       for (const Surfel& surfel : random_surfels(grid, T_world_camera, 1, around, largest, random))
         if (!split_levels(grid, seen(quantised(surfel, camera.config))).open) surfels.push_back(surfel);
+    for (int n = 0; n < anywhere; ++n) {
+      surfels.push_back(random_surfels(grid, T_world_camera, 1, 0, 1, random).front());
+      surfels.back().position = (T_world_camera * (random.direction() * random.uniform(0, 2 * camera.config.z_max))).cast<float>();
+    }
     std::vector<std::uint32_t> dead;
     for (const std::uint32_t slot : probe.map().replace(surfels, 1))
-      if (random.chance(0.1)) dead.push_back(slot);
+      if (slot / PAGE_SLOTS % 4 != 3 && random.chance(0.1)) dead.push_back(slot);  // full pages stay
     probe.kill(dead);
     probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 7);
   }
@@ -76,40 +82,116 @@ bool touches_grid(const Scene& scene, const SeenSurfel& s) {
 bool far_from_grid(const Scene& scene, const SeenSurfel& s) {
   const double reach = 3 * (std::max(s.rho, scene.camera.config.thickness) + 2);  // [voxel]
   for (int axis = 0; axis < 2; ++axis) {
-    const double along = reach * (1 + std::abs(s.ray[axis])), size = axis == 0 ? scene.grid.size_i : scene.grid.size_j;
+    const double slope = std::abs(s.p_camera[axis]) / std::max(s.p_camera.z(), scene.grid.z_min);  // in the cuboid, too
+    const double along = reach * (1 + slope), size = axis == 0 ? scene.grid.size_i : scene.grid.size_j;
     if (s.c[axis] < -along || s.c[axis] > size + along) return true;
   }
   return s.c.z() < -reach || s.p_camera.z() > scene.camera.config.z_max + reach * scene.grid.voxel_size(s.p_camera.z());
 }
 
-TEST(StageSurfelsInView, Selection) {
+struct Selected {
   std::size_t must = 0, must_not = 0;
+};
+
+/// All surfels of the map that may touch the grid are in view, and none that is far from it.
+Selected check_selection(const Scene& scene) {
+  Selected selected;
+  std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
+  std::sort(slots.begin(), slots.end());
+  EXPECT_TRUE(std::adjacent_find(slots.begin(), slots.end()) == slots.end());
+  std::size_t alive = 0;
+  for (const Surfel& surfel : scene.probe.map().download()) {
+    const bool in_view = std::binary_search(slots.begin(), slots.end(), surfel.id);
+    const SeenSurfel s = scene.seen(surfel);
+    alive += in_view;
+    if (touches_grid(scene, s)) {
+      ++selected.must;
+      EXPECT_TRUE(in_view) << "surfel " << surfel.id << " at " << s.c.transpose();
+    } else if (far_from_grid(scene, s)) {
+      ++selected.must_not;
+      EXPECT_FALSE(in_view) << "surfel " << surfel.id << " at " << s.c.transpose();
+    }
+  }
+  EXPECT_EQ(alive, slots.size()) << "surfels are in view that are not in the map";
+  return selected;
+}
+
+TEST(StageSurfelsInView, Selection) {
+  Selected all;
   for (const Camera& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 130, 24, 2, 1);
-    const std::vector<Surfel> surfels = scene.probe.map().download();
     const std::size_t count = scene.probe.stages().select_in_view();
-    std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
-    ASSERT_EQ(slots.size(), count);
-    std::sort(slots.begin(), slots.end());
-    EXPECT_TRUE(std::adjacent_find(slots.begin(), slots.end()) == slots.end());
-    std::size_t alive = 0;
-    for (const Surfel& surfel : surfels) {
-      const bool selected = std::binary_search(slots.begin(), slots.end(), surfel.id);
-      const SeenSurfel s = scene.seen(surfel);
-      alive += selected;
-      if (touches_grid(scene, s)) {
-        ++must;
-        EXPECT_TRUE(selected) << "surfel " << surfel.id << " at " << s.c.transpose();
-      } else if (far_from_grid(scene, s)) {
-        ++must_not;
-        EXPECT_FALSE(selected) << "surfel " << surfel.id << " at " << s.c.transpose();
-      }
-    }
-    EXPECT_EQ(alive, count) << "surfels are in view that are not in the map";
+    EXPECT_EQ(count, scene.probe.in_view_slots().size());
+    const Selected selected = check_selection(scene);
+    all.must += selected.must;
+    all.must_not += selected.must_not;
   }
-  EXPECT_GT(must, small_tests() ? 3u : 50u) << "nothing was tested";
-  EXPECT_GT(must_not, small_tests() ? 3u : 50u) << "nothing was tested";
+  EXPECT_GT(all.must, small_tests() ? 3u : 50u) << "nothing was tested";
+  EXPECT_GT(all.must_not, small_tests() ? 3u : 50u) << "nothing was tested";
+}
+
+/// Pages that are full, partly full and empty; with all, some and none of their surfels in view.
+TEST(StageSurfelsInView, Pages) {
+  std::size_t full = 0, partly = 0, empty = 0, all = 0, some = 0, none = 0;
+  for (const Camera& camera : cameras()) {
+    SCOPED_TRACE(camera.name);
+    Scene scene(camera, 400, 3, 2, 6, test_commands(), 1000);
+    StagesProbe& probe = scene.probe;
+    const std::vector<std::uint32_t> pages = probe.window_pages();
+    ASSERT_FALSE(pages.empty());
+    std::vector<std::uint32_t> dead;
+    for (const std::size_t n : {pages.size() / 4, pages.size() / 2})
+      for (std::uint32_t bit = 0; bit < PAGE_SLOTS; ++bit)
+        if (probe.is_alive(PAGE_SLOTS * pages[n] + bit)) dead.push_back(PAGE_SLOTS * pages[n] + bit);
+    std::sort(dead.begin(), dead.end());
+    dead.erase(std::unique(dead.begin(), dead.end()), dead.end());
+    probe.kill(dead);
+    const std::size_t count = probe.stages().select_in_view();
+    EXPECT_EQ(count, probe.in_view_slots().size());
+    check_selection(scene);
+    const std::vector<std::uint64_t> in_view = probe.in_view_words(), large = probe.large_words();
+    for (std::size_t n = 0; n < pages.size(); ++n) {
+      const std::uint64_t alive = probe.alive_word(pages[n]);
+      EXPECT_EQ(in_view[n] & ~alive, 0u) << "free slots are in view";
+      EXPECT_EQ(large[n] & ~in_view[n], 0u) << "large, but not in view";
+      full += ~alive == 0;
+      empty += alive == 0;
+      partly += alive != 0 && ~alive != 0;
+      if (alive == 0) continue;
+      all += in_view[n] == alive;
+      none += in_view[n] == 0;
+      some += in_view[n] != alive && in_view[n] != 0;
+    }
+  }
+  for (const std::size_t pages : {partly, empty, all, some, none}) EXPECT_GT(pages, 2u) << "nothing was tested";
+  EXPECT_TRUE(full > 0 || small_tests());
+}
+
+/// The slots to be split are those of large surfels in the grid. @return how many
+std::size_t check_large(const Scene& scene) {
+  const std::vector<std::uint32_t> slots = scene.probe.large_slots();
+  const std::set<std::uint32_t> large(slots.begin(), slots.end());
+  std::size_t of_map = 0;
+  for (const Surfel& surfel : scene.probe.map().download()) {
+    const Levels expected = split_levels(scene.grid, scene.seen(surfel));
+    of_map += large.count(surfel.id);
+    if (expected.open) continue;
+    EXPECT_EQ(large.count(surfel.id) != 0, expected.levels > 0) << "slot " << surfel.id;
+  }
+  EXPECT_EQ(of_map, slots.size());
+  return of_map;
+}
+
+TEST(StageSurfelsInView, Large) {
+  std::size_t large = 0;
+  for (const Camera& camera : cameras()) {
+    SCOPED_TRACE(camera.name);
+    Scene scene(camera, 200, 6, 10, 7);
+    scene.probe.stages().select_in_view();
+    large += check_large(scene);
+  }
+  EXPECT_GT(large, 20u) << "nothing was tested";
 }
 
 TEST(StageSurfelsInView, SizesOfTheMap) {
@@ -131,7 +213,8 @@ TEST(StageSurfelsInView, HowTheGridSeesThem) {
     scene.probe.stages().select_in_view();
     EXPECT_EQ(scene.probe.stages().split_surfels(), 0u);
     const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
-    const std::vector<ViewSurfel> placed = scene.probe.view_surfels();
+    const std::vector<ViewSurfel> placed = scene.probe.place_surfels();
+    ASSERT_EQ(placed.size(), slots.size());
     std::map<std::uint32_t, Surfel> map;
     for (const Surfel& surfel : surfels) map[surfel.id] = surfel;
     for (std::size_t n = 0; n < placed.size(); ++n) {
@@ -208,33 +291,37 @@ struct Split {
   std::set<std::uint32_t> updated, removed;
 };
 
-Split check_split(Scene& scene, const BySlot& before, const std::vector<std::uint32_t>& in_view) {
+/// @param in_view  slots, page after page;  parents are split in this order
+Split check_split(const Scene& scene, const BySlot& before, const std::vector<std::uint32_t>& in_view) {
   const BySlot after = by_slot(scene.probe.map().download());
-  const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
-  const std::vector<ViewSurfel> placed = scene.probe.view_surfels();
   Split split;
-  for (std::size_t n = 0; n < in_view.size(); ++n) {
-    const Levels expected = split_levels(scene.grid, scene.seen(before.at(in_view[n])));
-    SCOPED_TRACE("slot " + std::to_string(in_view[n]) + ", levels " + std::to_string(expected.levels));
-    split.most_levels = std::max(split.most_levels, expected.levels);
-    if (expected.levels == 0) {
-      EXPECT_TRUE(same(after.at(in_view[n]), before.at(in_view[n])));
-      continue;
-    }
-    ++split.parents;
-    split.removed.insert(in_view[n]);
-    EXPECT_LT(placed[n].i, -1e5F) << "the parent is still in view";
-    std::vector<Surfel> children;
-    for (int child = 0; child < 1 << (2 * expected.levels); ++child) {
-      const std::size_t number = in_view.size() + split.children++;
-      EXPECT_EQ(placed.at(number).slot, slots.at(number));
-      EXPECT_TRUE(split.updated.insert(slots.at(number)).second) << "two surfels in one slot";
-      children.push_back(after.at(slots.at(number)));
-    }
-    check_children(before.at(in_view[n]), expected.levels, children, position_step(scene.camera.config));
+  std::vector<std::pair<std::uint32_t, int>> parents;  // and their levels
+  std::set<std::uint32_t> stay;
+  for (const auto& [slot, surfel] : before) stay.insert(slot);
+  for (const std::uint32_t slot : in_view) {
+    const int levels = split_levels(scene.grid, scene.seen(before.at(slot))).levels;
+    if (levels == 0) continue;
+    parents.emplace_back(slot, levels);
+    stay.erase(slot);
+    split.removed.insert(slot);
+    split.children += std::size_t{1} << (2 * levels);
+    split.most_levels = std::max(split.most_levels, levels);
   }
-  EXPECT_EQ(slots.size(), in_view.size() + split.children);
+  split.parents = parents.size();
+  for (const std::uint32_t slot : stay) EXPECT_TRUE(after.count(slot) != 0 && same(after.at(slot), before.at(slot))) << "slot " << slot;
   EXPECT_EQ(after.size(), before.size() + split.children - split.parents);
+  const std::vector<std::uint32_t> slots =
+      scene.probe.find_slots(scene.probe.new_surfels(split.children), scene.probe.new_cells(split.children), stay);
+  auto next = slots.begin();
+  for (const auto& [slot, levels] : parents) {
+    SCOPED_TRACE("slot " + std::to_string(slot) + ", levels " + std::to_string(levels));
+    std::vector<Surfel> children;
+    for (int child = 0; child < 1 << (2 * levels); ++child, ++next) {
+      EXPECT_TRUE(split.updated.insert(*next).second) << "two surfels in one slot";
+      children.push_back(after.at(*next));
+    }
+    check_children(before.at(slot), levels, children, position_step(scene.camera.config));
+  }
   for (const std::uint32_t slot : split.updated) split.removed.erase(slot);  // taken again
   return split;
 }
@@ -249,6 +336,8 @@ TEST(StageSurfelsInView, Split) {
     const std::vector<std::uint32_t> in_view = scene.probe.in_view_slots();
     const std::size_t added = scene.probe.stages().split_surfels();
     const Split split = check_split(scene, before, in_view);
+    check_selection(scene);  // children are in view, or not, like others; parents no more
+    check_large(scene);      // again, at their own depth
     EXPECT_EQ(added, split.children - split.parents);
     EXPECT_EQ(scene.probe.map().size(), before.size() + added);
     most_levels = std::max(most_levels, split.most_levels);

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -50,6 +53,7 @@ class StagesProbe {
   Stages& stages() { return stages_; }
   Lists& lists() { return lists_; }
   SurfelMap& map() { return map_; }
+  const SurfelMap& map() const { return map_; }
   RecentViews& views() { return views_; }
   Commands& commands() { return commands_; }
 
@@ -150,23 +154,63 @@ class StagesProbe {
     return paths;
   }
 
-  std::size_t in_view() const { return stages_.in_view_; }
-  std::vector<std::uint32_t> in_view_slots() const { return stages_.in_view_slots_.read(in_view()); }
-  std::vector<ViewSurfel> view_surfels() const { return stages_.view_surfels_.read(in_view()); }
-  void set_view_surfels(const std::vector<ViewSurfel>& surfels) {
-    stages_.view_surfels_.resize(1);
-    stages_.view_surfels_.write(surfels);
-    stages_.in_view_ = surfels.size();
+  /// The window's pages, as the kernels that go through them number them; and a word for each, a bit a slot.
+  std::vector<std::uint32_t> window_pages() const {
+    std::vector<std::uint32_t> pages(map_.window_pages());
+    if (!pages.empty()) commands_.queue().enqueueReadBuffer(map_.pages(), CL_TRUE, 0, pages.size() * sizeof(cl_uint), pages.data());
+    return pages;
   }
-  void set_in_view_slots(const std::vector<std::uint32_t>& slots) {
-    stages_.in_view_slots_.resize(1);
-    stages_.in_view_slots_.write(slots);
-    stages_.in_view_ = slots.size();
+  std::vector<std::uint64_t> in_view_words() const { return stages_.in_view_bits_.read(map_.window_pages()); }
+  std::vector<std::uint64_t> large_words() const { return stages_.large_bits_.read(map_.window_pages()); }
+  std::vector<std::uint64_t> removed_words() const { return stages_.removed_bits_.read(map_.window_pages()); }
+  void set_removed_words(const std::vector<std::uint64_t>& words) {
+    stages_.removed_bits_.resize(words.size() + 1);
+    stages_.removed_bits_.write(words);
   }
-  std::vector<std::uint64_t> removed_bits() const { return stages_.removed_bits_.read((in_view() + 63) / 64); }
-  void set_removed_bits(const std::vector<std::uint64_t>& bits) {
-    stages_.removed_bits_.resize(bits.size() + 1);
-    stages_.removed_bits_.write(bits);
+  std::uint64_t alive_word(std::uint32_t page) const { return peek<cl_ulong>(map_.alive(), page); }
+
+  /// Slots that such words say, page after page.
+  std::vector<std::uint32_t> slots_of(const std::vector<std::uint64_t>& words) const {
+    std::vector<std::uint32_t> slots;
+    const std::vector<std::uint32_t> pages = window_pages();
+    for (std::size_t n = 0; n < words.size(); ++n)
+      for (std::uint32_t bit = 0; bit < PAGE_SLOTS; ++bit)
+        if (words[n] >> bit & 1) slots.push_back(PAGE_SLOTS * pages[n] + bit);
+    return slots;
+  }
+  std::vector<std::uint32_t> in_view_slots() const { return slots_of(in_view_words()); }
+  std::vector<std::uint32_t> large_slots() const { return slots_of(large_words()); }
+
+  /// Surfels in view as the grid sees them, in the order of in_view_slots().
+  std::vector<ViewSurfel> place_surfels() {
+    stages_.place_surfels();
+    return view_surfels();
+  }
+  std::vector<ViewSurfel> view_surfels() const { return stages_.view_surfels_.read(stages_.in_view_); }
+
+  /// What was last put into the map, in its order, and the cell of the window for each.
+  std::vector<cl_uint4> new_surfels(std::size_t count) const { return stages_.new_surfels_.read(count); }
+  std::vector<cl_uint> new_cells(std::size_t count) const { return stages_.new_cells_.read(count); }
+
+  /// Where surfels stand in the map, or in the part of it that is in none of the slots `but`. Each must be there once.
+  std::vector<std::uint32_t> find_slots(const std::vector<cl_uint4>& surfels, const std::vector<cl_uint>& cells,
+                                        const std::set<std::uint32_t>& but) const {
+    std::map<std::array<std::int64_t, 7>, std::uint32_t> slots;
+    const auto key = [](const cl_uint4& p, const BlockKey& b) {
+      return std::array<std::int64_t, 7>{p.s[0], p.s[1], p.s[2], p.s[3], b.x, b.y, b.z};
+    };
+    for (const Surfel& surfel : map_.download()) {
+      if (but.count(surfel.id) != 0) continue;
+      EXPECT_TRUE(slots.emplace(key(packed(surfel.id), block_of_slot(surfel.id)), surfel.id).second) << "two surfels are the same";
+    }
+    EXPECT_EQ(slots.size(), surfels.size()) << "so many are new";
+    std::vector<std::uint32_t> found;
+    for (std::size_t n = 0; n < surfels.size(); ++n) {
+      const auto at = slots.find(key(surfels[n], map_.window().block(static_cast<int>(cells[n]))));
+      EXPECT_TRUE(at != slots.end()) << "surfel " << n << " is not in its block";
+      found.push_back(at == slots.end() ? 0 : at->second);
+    }
+    return found;
   }
 
   void list_candidates() { stages_.list_candidates(); }
