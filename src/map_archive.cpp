@@ -33,7 +33,8 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map)
 
 MapArchive::~MapArchive() {
   try {
-    save(unsaved(), saved_);
+    folder_.flush();
+    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
     folder_.flush();
   } catch (const std::exception&) {  // what was saved before is still there
   }
@@ -84,7 +85,7 @@ bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32
   return !near.empty();
 }
 
-/// Those a little further than `radius` stay where they are, so that none goes to and fro.
+/// Those a little further than `radius` stay where they are, so that none goes to and fro; and those that cannot be written.
 bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   Blocks far;
   for (const auto& [block, pages] : map_.index().blocks())
@@ -93,22 +94,17 @@ bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32
   std::sort(far.begin(), far.end());
   const Blocks changed = unsaved();
   const auto is_unsaved = [&](const BlockKey& block) { return std::binary_search(changed.begin(), changed.end(), block); };
-  if (std::any_of(far.begin(), far.end(), is_unsaved)) save(changed, frame - 1);
+  if (std::any_of(far.begin(), far.end(), is_unsaved) && !save(changed, frame - 1, frame))
+    far.erase(std::remove_if(far.begin(), far.end(), is_unsaved), far.end());
   for (const BlockKey& block : far) {
     map_.drop_block(block, frame);
     note_stored(block);
   }
-  return true;
+  return !far.empty();
 }
 
 void MapArchive::save_some(std::uint32_t frame) {
-  if (frame < next_save_) return;
-  next_save_ = frame + kSavePeriod;
-  try {
-    save(unsaved(), frame);
-  } catch (const std::exception&) {  // the frame itself is mapped
-    fault_ = std::current_exception();
-  }
+  if (frame >= saved_ + kSavePeriod || saved_ == 0) save(unsaved(), frame, frame);
 }
 
 /// Sorted. Blocks that have become empty are among them.
@@ -119,11 +115,20 @@ MapArchive::Blocks MapArchive::unsaved() const {
   return all;
 }
 
-/// All or, if it throws, nothing. Blocks without surfels are erased.
-void MapArchive::save(const Blocks& blocks, std::uint32_t frame) {
-  if (!blocks.empty()) folder_.write(map_.read_blocks(blocks));
+/// All or, if it fails, nothing: a fault waits for the next frame, and the next try for some more. Blocks without surfels are erased.
+/// @param mapped  the last frame in the map. @param frame  this one
+bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame) {
+  if (frame < next_try_) return false;
+  try {
+    if (!blocks.empty()) folder_.write(map_.read_blocks(blocks));
+  } catch (const std::exception&) {
+    fault_ = std::current_exception();
+    next_try_ = frame + kSavePeriod;
+    return false;
+  }
   shrunk_.clear();
-  saved_ = frame;
+  saved_ = mapped;
+  return true;
 }
 
 std::vector<Surfel> MapArchive::stored() const {
@@ -144,7 +149,7 @@ void MapArchive::clear() {
   followed_.reset();
   shrunk_.clear();
   fault_ = nullptr;
-  saved_ = next_save_ = 0;
+  saved_ = next_try_ = 0;
 }
 
 }  // namespace frontier_surfels

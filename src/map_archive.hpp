@@ -28,7 +28,8 @@ class MapArchive {
 
   /// Brings blocks near the camera into memory, and takes far ones out. @param reach  distance along an axis within which the frame needs
   /// them [m], be it more than config.eviction_radius. @param frame  number that they get. @return whether it did
-  /// @throws FileError  a block could not be read or written; the map is as it was, but for whole blocks that have come or gone
+  /// @throws FileError  a block could not be read, or the last save failed; the map is as it was, but for whole blocks that have come or
+  /// gone. What cannot be written stays in memory.
   bool follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame);
 
   /// Notes blocks that have lost surfels, which no page that is left may tell.
@@ -50,7 +51,7 @@ class MapArchive {
   bool fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   bool evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   Blocks unsaved() const;
-  void save(const Blocks& blocks, std::uint32_t frame);
+  bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
 
   SurfelMap& map_;
   const double radius_;  ///< [m]
@@ -60,7 +61,8 @@ class MapArchive {
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
   std::set<BlockKey> shrunk_;                    ///< since the last save
   std::exception_ptr fault_;                     ///< of a save that failed
-  std::uint32_t saved_ = 0, next_save_ = 0;      ///< frame of the last save, and of the next one
+  std::uint32_t saved_ = 0;                      ///< frame of the last save
+  std::uint32_t next_try_ = 0;                   ///< frame that may save again
 };
 
 }  // namespace frontier_surfels
