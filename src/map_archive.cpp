@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "surfel_packing.hpp"
@@ -10,7 +11,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::int32_t kRegion = 8;        // blocks along the edge of a region of the index
-constexpr std::uint32_t kSavePeriod = 30;  // frames: so many a kill may cost
+constexpr std::uint32_t kSavePeriod = 20;  // frames: so many a kill costs at most, and those that come until they are written
 
 std::int32_t floor_divide(std::int32_t a, std::int32_t b) { return a / b - (a % b < 0 ? 1 : 0); }
 
@@ -32,7 +33,8 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map)
 
 MapArchive::~MapArchive() {
   try {
-    save(saved_);
+    folder_.flush();
+    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
     folder_.flush();
   } catch (const std::exception&) {  // what was saved before is still there
   }
@@ -40,33 +42,40 @@ MapArchive::~MapArchive() {
 
 void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }
 
-bool MapArchive::follow(const Eigen::Vector3d& camera, std::uint32_t frame) {
+bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame) {
   if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
-  if (followed_ && (camera - *followed_).norm() < map_.block_size() / 2) return false;
-  const bool evicted = evict(camera, frame), fetched = fetch(camera, frame);
+  const double radius = std::max(radius_, reach);
+  if (followed_ && (camera - *followed_).norm() < map_.block_size() / 2 && radius <= followed_radius_) return false;
+  const bool evicted = evict(camera, radius, frame), fetched = fetch(camera, radius, frame);
   followed_ = camera;
+  followed_radius_ = radius;
   return evicted || fetched;
 }
 
-/// In memory are blocks up to radius_; those a little further stay where they are, so that none goes to and fro.
-MapArchive::Blocks MapArchive::stored_near(const Eigen::Vector3d& camera) const {
+MapArchive::Blocks MapArchive::stored_near(const Eigen::Vector3d& camera, double radius) const {
   const double size = map_.block_size() * kRegion;
-  const Eigen::Array3d low = ((camera.array() - radius_) / size).floor(), high = ((camera.array() + radius_) / size).floor();
+  const Eigen::Array3d low = ((camera.array() - radius) / size).floor(), high = ((camera.array() + radius) / size).floor();
   Blocks near;
-  for (double z = low.z(); z <= high.z(); ++z)
-    for (double y = low.y(); y <= high.y(); ++y)
-      for (double x = low.x(); x <= high.x(); ++x) {
-        const auto found = stored_.find({static_cast<std::int32_t>(x), static_cast<std::int32_t>(y), static_cast<std::int32_t>(z)});
-        if (found == stored_.end()) continue;
-        for (const BlockKey& block : found->second)
-          if (distance(camera, block, map_.block_size()) <= radius_) near.push_back(block);
-      }
+  const auto add_near_ones = [&](const Blocks& blocks) {
+    for (const BlockKey& block : blocks)
+      if (distance(camera, block, map_.block_size()) <= radius) near.push_back(block);
+  };
+  if ((high - low + 1).prod() >= static_cast<double>(stored_.size())) {
+    for (const auto& [region, blocks] : stored_) add_near_ones(blocks);
+  } else {
+    for (double z = low.z(); z <= high.z(); ++z)
+      for (double y = low.y(); y <= high.y(); ++y)
+        for (double x = low.x(); x <= high.x(); ++x) {
+          const auto found = stored_.find({static_cast<std::int32_t>(x), static_cast<std::int32_t>(y), static_cast<std::int32_t>(z)});
+          if (found != stored_.end()) add_near_ones(found->second);
+        }
+  }
   std::sort(near.begin(), near.end());
   return near;
 }
 
-bool MapArchive::fetch(const Eigen::Vector3d& camera, std::uint32_t frame) {
-  const Blocks near = stored_near(camera);
+bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
+  const Blocks near = stored_near(camera, radius);
   for (const BlockKey& block : near) {
     map_.add_block(block, folder_.read(block), frame);
     const auto region = stored_.find(region_of(block));
@@ -76,44 +85,50 @@ bool MapArchive::fetch(const Eigen::Vector3d& camera, std::uint32_t frame) {
   return !near.empty();
 }
 
-bool MapArchive::evict(const Eigen::Vector3d& camera, std::uint32_t frame) {
+/// Those a little further than `radius` stay where they are, so that none goes to and fro; and those that cannot be written.
+bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   Blocks far;
   for (const auto& [block, pages] : map_.index().blocks())
-    if (distance(camera, block, map_.block_size()) > radius_ + 2 * map_.block_size()) far.push_back(block);
+    if (distance(camera, block, map_.block_size()) > radius + 2 * map_.block_size()) far.push_back(block);
   if (far.empty()) return false;
   std::sort(far.begin(), far.end());
-  write(far);
+  const Blocks changed = unsaved();
+  const auto is_unsaved = [&](const BlockKey& block) { return std::binary_search(changed.begin(), changed.end(), block); };
+  if (std::any_of(far.begin(), far.end(), is_unsaved) && !save(changed, frame - 1, frame))
+    far.erase(std::remove_if(far.begin(), far.end(), is_unsaved), far.end());
   for (const BlockKey& block : far) {
     map_.drop_block(block, frame);
     note_stored(block);
   }
-  return true;
+  return !far.empty();
 }
 
-void MapArchive::save_some(const std::vector<BlockKey>& emptied, std::uint32_t frame) {
-  emptied_.insert(emptied_.end(), emptied.begin(), emptied.end());
-  if (frame < saved_ + kSavePeriod) return;
+void MapArchive::save_some(std::uint32_t frame) {
+  if (frame >= saved_ + kSavePeriod || saved_ == 0) save(unsaved(), frame, frame);
+}
+
+/// Sorted. Blocks that have become empty are among them.
+MapArchive::Blocks MapArchive::unsaved() const {
+  const Blocks changed = map_.blocks_changed_since(saved_);
+  Blocks all;
+  std::set_union(changed.begin(), changed.end(), shrunk_.begin(), shrunk_.end(), std::back_inserter(all));
+  return all;
+}
+
+/// All or, if it fails, nothing: a fault waits for the next frame, and the next try for some more. Blocks without surfels are erased.
+/// @param mapped  the last frame in the map. @param frame  this one
+bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame) {
+  if (frame < next_try_) return false;
   try {
-    save(frame);
-  } catch (const FileError&) {  // the frame itself is mapped
+    if (!blocks.empty()) folder_.write(map_.read_blocks(blocks));
+  } catch (const std::exception&) {
     fault_ = std::current_exception();
+    next_try_ = frame + kSavePeriod;
+    return false;
   }
-}
-
-void MapArchive::save(std::uint32_t frame) {
-  Blocks blocks = map_.blocks_changed_since(saved_);
-  std::sort(emptied_.begin(), emptied_.end());
-  emptied_.erase(std::unique(emptied_.begin(), emptied_.end()), emptied_.end());
-  for (const BlockKey& block : emptied_)
-    if (map_.index().find(block) == nullptr && folder_.contains(block)) blocks.push_back(block);
-  write(blocks);
-  emptied_.clear();
-  saved_ = frame;
-}
-
-/// Blocks without surfels are erased.
-void MapArchive::write(const Blocks& blocks) {
-  if (!blocks.empty()) folder_.write(map_.read_blocks(blocks));
+  shrunk_.clear();
+  saved_ = mapped;
+  return true;
 }
 
 std::vector<Surfel> MapArchive::stored() const {
@@ -132,8 +147,9 @@ void MapArchive::clear() {
   folder_.clear();
   stored_.clear();
   followed_.reset();
-  emptied_.clear();
-  saved_ = 0;
+  shrunk_.clear();
+  fault_ = nullptr;
+  saved_ = next_try_ = 0;
 }
 
 }  // namespace frontier_surfels

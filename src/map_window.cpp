@@ -16,12 +16,20 @@ Eigen::Vector4d border_slopes(const Grid& g) {
           (g.size_j - 0.5 - g.center_j) / g.fy};
 }
 
+/// Depth at which the grid ends [m].
+double far_end(const Grid& g) { return g.z_min * std::exp((g.size_k - g.k_min) / g.f); }
+
 /// Is a ball outside the plane through the camera with this slope? @param side  1: the grid lies above the slope, -1: below
 bool beyond(double x, double z, double slope, double side, double radius) {
   return side * (x - slope * z) < -radius * std::sqrt(1 + slope * slope);
 }
 
 }  // namespace
+
+double grid_reach(const Grid& grid) {
+  const Eigen::Array4d slopes = border_slopes(grid).array().square();
+  return far_end(grid) * std::sqrt(1 + slopes.head<2>().maxCoeff() + slopes.tail<2>().maxCoeff());
+}
 
 double block_size_for(double z_max) {
   double size = 0.5;
@@ -30,7 +38,7 @@ double block_size_for(double z_max) {
 }
 
 MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin) : grid_(grid) {
-  z_far_ = grid.z_min * std::exp((grid.size_k - grid.k_min) / grid.f);
+  z_far_ = far_end(grid);
   sphere_ = block_size * std::sqrt(3.0) / 2 + margin;
 
   // Between the grid's two ends its cross-section lies within that of their convex hull.

@@ -41,6 +41,9 @@ class MapWindow {
   double z_far_ = 0;                                                  ///< depth at which the grid ends [m]
 };
 
+/// Largest distance between the camera and a point of its grid [m].
+double grid_reach(const Grid& grid);
+
 /// Edge of the blocks for a range [m]: a power of two, half a metre where the range is short.
 double block_size_for(double z_max);
 

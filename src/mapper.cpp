@@ -1,6 +1,7 @@
 #include "frontier_surfels/mapper.hpp"
 
 #include <chrono>
+#include <utility>
 
 #include "frontier_surfels/ply.hpp"
 #include "map_archive.hpp"
@@ -37,6 +38,9 @@ auto on_device(Work work) -> decltype(work()) {
 
 struct Mapper::Impl {
   Report integrate(const DepthFrame& frame);
+  void finish_frame();
+  void fetch_blocks(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
+  void begin_map(const std::vector<Surfel>& surfels);
 
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
@@ -60,7 +64,7 @@ struct Mapper::Impl {
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
   bool unfinished = false;            ///< the last frame failed
-  bool blocks_moved = false;          ///< to or from the archive, since the last frame
+  bool pages_changed = false;         ///< since the last finished frame: by one that failed, or by the archive
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -83,12 +87,14 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   const WorkingImage image = make_working_image(frame, config);
   frame_on_device = 0;
   if (unfinished) {  // a frame failed half way, but may have split surfels: older changes tell of it
-    stages.finish_frame();
-    blocks_moved = true;
+    pages_changed = true;
+    finish_frame();
+    unfinished = false;
   }
+  const auto number = static_cast<std::uint32_t>(report.sequence);
+  if (archive) fetch_blocks(image, frame.T_world_camera, number);
   unfinished = true;
-  if (archive && archive->follow(frame.T_world_camera.translation(), static_cast<std::uint32_t>(report.sequence))) blocks_moved = true;
-  stages.begin_frame(image, frame.T_world_camera, static_cast<std::uint32_t>(report.sequence));
+  stages.begin_frame(image, frame.T_world_camera, number);
 
   // Observed space C~ - 3.3, eq. (9)-(11)
   stages.observe_space();
@@ -121,20 +127,32 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
 
   // Labels and colour - 3.5
   stages.label_surfels();
-  const std::vector<BlockKey> emptied = stages.finish_frame();
-  unfinished = false;
+  finish_frame();
 
-  if (archive) archive->save_some(emptied, static_cast<std::uint32_t>(report.sequence));
+  if (archive) archive->save_some(number);
   report.view_kept = views.keep_current();
   report.stages = commands.take_times();
+  unfinished = false;
   sequence = report.sequence;
-  frame_on_device = blocks_moved ? 0 : sequence;
-  blocks_moved = false;
+  frame_on_device = pages_changed ? 0 : sequence;
+  pages_changed = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.device_bytes = commands.allocated_bytes();
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
+}
+
+void Mapper::Impl::finish_frame() {
+  const std::vector<BlockKey> shrunk = stages.finish_frame();
+  if (archive) archive->note_shrunk(shrunk);
+}
+
+/// Once more if surfels have come that are larger than any before: they matter to a wider window.
+void Mapper::Impl::fetch_blocks(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame) {
+  bool changed = std::exchange(pages_changed, true);  // whatever fails
+  while (archive->follow(T_world_camera.translation(), stages.set_camera(image, T_world_camera), frame)) changed = true;
+  pages_changed = changed;
 }
 
 std::vector<Surfel> Mapper::surfels() const {
@@ -177,17 +195,20 @@ void Mapper::load(const std::string& path) {
 }
 
 void Mapper::load(const std::vector<Surfel>& surfels) {
-  on_device([&] { impl_->map.replace(surfels, static_cast<std::uint32_t>(impl_->sequence + 1)); });
-  if (impl_->archive) impl_->archive->clear();
-  impl_->views.clear(impl_->map.size() == 0);
-  ++impl_->sequence;
+  on_device([&] { impl_->begin_map(surfels); });
+}
+
+void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels) {
+  map.replace(surfels, static_cast<std::uint32_t>(sequence + 1));
+  ++sequence;
+  views.clear(map.size() == 0);
+  if (!archive) return;
+  archive->clear();
+  archive->save_some(static_cast<std::uint32_t>(sequence));
 }
 
 void Mapper::reset() {
-  on_device([&] { impl_->map.replace({}, static_cast<std::uint32_t>(impl_->sequence + 1)); });
-  if (impl_->archive) impl_->archive->clear();
-  impl_->views.clear(true);
-  ++impl_->sequence;
+  on_device([&] { impl_->begin_map({}); });
 }
 
 Statistics Mapper::statistics() const {

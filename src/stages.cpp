@@ -78,8 +78,13 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       tile_cursor_(commands),
       tile_surfels_(commands) {}
 
-void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame) {
+double Stages::set_camera(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
   if (!same_camera(intrinsics_, image.intrinsics)) set_grid(image);
+  return map_.window_reach(grid_, T_world_camera) + kHullReach * config_.z_max;
+}
+
+void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame) {
+  set_camera(image, T_world_camera);
   frame_ = frame;
   map_.open_window(grid_, T_world_camera);
   window_ = map_.window().window();

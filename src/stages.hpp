@@ -19,6 +19,9 @@ class Stages {
  public:
   Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap& map, RecentViews& views);
 
+  /// Takes a frame's camera. @return distance from it along an axis within which the frame asks for blocks of the map [m]
+  double set_camera(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
+
   /// Sends a frame's image and, where the camera has changed, its grid. @param frame  number that changed surfels get
   void begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
 
@@ -39,7 +42,7 @@ class Stages {
   std::size_t create_surfels();  ///< @return how many
   void label_surfels();
 
-  std::vector<BlockKey> finish_frame();  ///< notes what has changed in the map. @return blocks that have become empty
+  std::vector<BlockKey> finish_frame();  ///< notes what has changed in the map. @return blocks that have lost pages
 
  private:
   friend class StagesProbe;  // tests read and write the fields between stages

@@ -19,6 +19,12 @@ constexpr double kLargestRadius = 4;        // [block]; the window, around all t
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
+/// Voxel at the far end [m], and some more.
+double coarsest_voxel(const Grid& grid) { return 1.2 * grid.z_max / grid.f; }
+
+/// Radius of the largest surfels that a view creates [m].
+double largest_created(const Grid& grid) { return std::sqrt(3.0) / 2 * coarsest_voxel(grid); }
+
 template <typename Visitor>
 void for_each_bit(std::uint64_t bits, Visitor visitor) {
   for (; bits != 0; bits &= bits - 1) visitor(static_cast<std::uint32_t>(__builtin_ctzll(bits)));
@@ -62,14 +68,23 @@ void SurfelMap::grow(std::size_t pages) {
   page_block_.grow(pages, kept, spare);
 }
 
-void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
-  const double coarsest = 1.2 * grid.z_max / grid.f;  // voxel at the far end [m], and some more
-  const double largest = std::max(largest_radius_, std::sqrt(3.0) / 2 * coarsest);
+/// How far from the grid a surfel may be that matters to it [m].
+double SurfelMap::window_margin(const Grid& grid) const {
+  const double voxel = coarsest_voxel(grid), largest = std::max(largest_radius_, largest_created(grid));
   const double slope =
       std::max({grid.center_i, grid.size_i - grid.center_i}) / grid.fx + std::max({grid.center_j, grid.size_j - grid.center_j}) / grid.fy;
-  const double reach = std::max(2 * largest, thickness_ * coarsest) + 2 * coarsest;
-  window_ = MapWindow(grid, T_world_camera, block_size_, reach * (1 + slope));
-  largest_radius_ = largest;
+  return (std::max(2 * largest, thickness_ * voxel) + 2 * voxel) * (1 + slope);
+}
+
+double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const {
+  const double margin = window_margin(grid);
+  const MapWindow window(grid, T_world_camera, block_size_, margin);  // refuses what is absurd
+  return grid_reach(grid) + margin + 2 * block_size_;                 // whole blocks; to the centre; and half a block of motion
+}
+
+void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
+  window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid));
+  largest_radius_ = std::max(largest_radius_, largest_created(grid));
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
@@ -91,6 +106,12 @@ void SurfelMap::list_window() {
   pages_list_.write(window_pages_);
   page_cells_list_.write(page_cells_);
   cell_pages_list_.write(cell_pages_);
+}
+
+/// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
+void SurfelMap::close_window() {
+  window_pages_.clear();
+  page_cells_.clear();
 }
 
 std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
@@ -171,14 +192,14 @@ std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t f
   commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changes_(),
                 empty_());
   const std::vector<cl_uchar> empty = empty_.read(count);
-  std::vector<BlockKey> emptied;
+  std::vector<BlockKey> shrunk;
   for (cl_uint n = 0; n < count; ++n) {
     if (!empty[n]) continue;
     const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
     index_.remove_page(block, window_pages_[n]);
-    if (index_.find(block) == nullptr) emptied.push_back(block);
+    shrunk.push_back(block);
   }
-  return emptied;
+  return shrunk;
 }
 
 Changes SurfelMap::last_changes() {
@@ -280,6 +301,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
     largest = std::max<double>(largest, kept.radius);
   }
   grow(std::max(alive.size(), index_.end()));
+  close_window();
   // What was there is noted as changed as well.
   const std::size_t before = index_.end();
   index.skip_to(before);
@@ -331,6 +353,7 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
   const std::vector<cl_uint4> surfels = to_surfels(bytes);
   const std::size_t pages = (surfels.size() + PAGE_SLOTS - 1) / PAGE_SLOTS;
   grow(index_.end() + pages);
+  close_window();
   for (std::size_t n = 0; n < pages; ++n) {
     const auto begin = surfels.begin() + PAGE_SLOTS * n;
     const std::vector<cl_uint4> some(begin, std::min(begin + PAGE_SLOTS, surfels.end()));
@@ -346,6 +369,7 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
 void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   const BlockIndex::Pages* found = index_.find(block);
   if (found == nullptr) return;
+  close_window();
   for (const Page page : BlockIndex::Pages(*found)) {
     size_ -= static_cast<std::size_t>(__builtin_popcountll(alive_.read_one(page)));
     alive_.write({0}, page);

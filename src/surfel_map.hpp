@@ -45,7 +45,7 @@ class SurfelMap {
   /// Accounts for surfels that a kernel has removed.
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Notes which pages the frame has changed, and frees empty ones. @return blocks that have none left
+  /// Notes which pages the frame has changed, and frees empty ones. @return blocks that have lost some, or all
   std::vector<BlockKey> finish_frame(const char* stage, std::uint32_t frame);
 
   /// What the last frame has changed. Only until the next one begins.
@@ -61,9 +61,14 @@ class SurfelMap {
   /// Replaces everything, as frame `frame`. Gives every block pages in the order in which its surfels come. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
-  /// @name Whole blocks, for the archive. Blocks of the window must not come or go during a frame.
+  /// @name Whole blocks, for the archive: between frames. The last frame's window is closed when one comes or goes.
   /// @{
   double block_size() const { return block_size_; }  ///< [m]
+
+  /// Largest distance along an axis between the camera, moved by half a block at most, and the centre of a block of its window [m].
+  /// @throws BadFrame  the grid is absurdly large for its range
+  double window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const;
+
   const BlockIndex& index() const { return index_; }
   std::vector<BlockKey> blocks_changed_since(std::uint32_t frame) const;  ///< sorted
   std::vector<StoredBlock> read_blocks(const std::vector<BlockKey>& blocks) const;
@@ -81,7 +86,9 @@ class SurfelMap {
   using PageVisitor = std::function<void(Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* surfels)>;
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
   void grow(std::size_t pages);
+  double window_margin(const Grid& grid) const;
   void list_window();
+  void close_window();
   void add_pages(const std::vector<cl_uint>& missing);
   void count_free(const char* stage);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;

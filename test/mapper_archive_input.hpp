@@ -1,0 +1,97 @@
+/// Walks that are longer than memory, for the tests of mappers with a map folder.
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <tuple>
+
+#include "frontier_surfels/ply.hpp"
+#include "map_folder.hpp"
+#include "map_window.hpp"
+#include "mapper_input.hpp"
+#include "surfel_packing.hpp"
+
+namespace frontier_surfels {
+
+/// Small images and ranges; few recent views, so that the known space must be computed from the surfels, which then matter from afar.
+inline Config walking() {
+  Config config = undecimated();
+  config.z_max = 1.5;
+  config.recent_views = 12;
+  return config;
+}
+
+inline Config walking(const std::string& folder) {
+  Config config = walking();
+  config.map_folder = folder;
+  config.eviction_radius = 4.5;
+  return config;
+}
+
+/// A view of a wall with steps in it. @param metres  how far along the wall
+inline replay::RecordedFrame wall_frame(double metres, double height) {
+  replay::RecordedFrame frame = plane_frame(plain_camera(40, 30, 36), 0, look_along({0, metres, height}, {1, 0.1 * height, 0}));
+  for (int v = 0; v < 30; ++v)
+    for (int u = 0; u < 40; ++u) frame.depth.at<float>(v, u) = static_cast<float>(1.1 + (u / 10 % 2) * 0.15 + 0.1 * std::sin(metres));
+  return frame;
+}
+
+/// `metres` along the wall, every 25 cm.
+inline Frames walk_there(double metres) {
+  Frames frames;
+  for (double y = 0; y <= metres; y += 0.25) frames.push_back(wall_frame(y, 0));
+  return frames;
+}
+
+/// There, and back on another way.
+inline Frames walk_there_and_back(double metres) {
+  Frames frames = walk_there(metres);
+  for (double y = metres; y >= 0; y -= 0.25) frames.push_back(wall_frame(y + 0.06, 0.3));
+  return frames;
+}
+
+/// By place, without ids: sets of surfels can be compared.
+inline std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
+  const auto key = [](const Surfel& s) {
+    return std::make_tuple(s.position.x(), s.position.y(), s.position.z(), s.normal.x(), s.normal.y(), s.normal.z(), s.radius, s.label,
+                           s.rgb);
+  };
+  std::sort(surfels.begin(), surfels.end(), [&](const Surfel& a, const Surfel& b) { return key(a) < key(b); });
+  for (Surfel& surfel : surfels) surfel.id = 0;
+  return surfels;
+}
+
+/// A folder of its own for each test.
+class MapperArchive : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "mapper_archive_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    path_ = (root_ / "map").string();
+  }
+  void TearDown() override { std::filesystem::remove_all(root_); }
+
+  /// All of a mapper's surfels, through a file.
+  std::vector<Surfel> saved(const Mapper& mapper) const {
+    const std::string file = (root_ / "saved.ply").string();
+    mapper.save(file);
+    return sorted(read_ply(file));
+  }
+
+  /// All surfels in the folder, which no mapper uses.
+  std::vector<Surfel> stored() const {
+    const double block_size = block_size_for(walking().z_max);
+    const MapFolder folder(path_, block_size);
+    std::vector<Surfel> surfels;
+    for (const BlockKey& block : folder.keys())
+      for (const Surfel& surfel : unpack_block(folder.read(block), block, block_size)) surfels.push_back(surfel);
+    return sorted(surfels);
+  }
+
+  std::filesystem::path root_;
+  std::string path_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,204 @@
+/// Map folders whose mapper is killed, whose disk is full or damaged, or that cannot be used.
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <iostream>
+#include <random>
+#include <thread>
+
+#include "mapper_archive_input.hpp"
+#include "sqlite.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr char kFolder[] = "FRONTIER_SURFELS_TEST_FOLDER";  // where the child maps
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// The child of the test below: maps at a camera's rate, and tells of every frame.
+TEST(MapperArchiveChild, DISABLED_MapsUntilItIsKilled) {
+  const char* folder = std::getenv(kFolder);
+  if (folder == nullptr) GTEST_SKIP() << "Only for the test that kills it.";
+  const int frames_done = open((std::string(folder) + "_frames").c_str(), O_WRONLY | O_CREAT | O_APPEND, 0666);
+  Mapper mapper{walking(folder)};
+  auto next = std::chrono::steady_clock::now();
+  for (const auto& frame : walk_there_and_back(30)) {
+    std::this_thread::sleep_until(next);
+    next = std::chrono::steady_clock::now() + std::chrono::milliseconds(25);
+    mapper.integrate(frame.view());
+    if (write(frames_done, "f", 1) != 1) return;
+  }
+  for (;;) pause();
+}
+
+/// A child with an OpenCL of its own. @return its process id
+pid_t start_child(const std::string& folder) {
+  setenv(kFolder, folder.c_str(), 1);
+  const pid_t child = fork();
+  if (child != 0) return child;
+  const int nowhere = open("/dev/null", O_WRONLY);
+  dup2(nowhere, STDOUT_FILENO);
+  execl("/proc/self/exe", "child", "--gtest_filter=MapperArchiveChild.*", "--gtest_also_run_disabled_tests", nullptr);
+  _exit(1);
+}
+
+TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
+  std::vector<std::vector<Surfel>> maps = {{}};  // after each frame; old ones are forgotten
+  Mapper mapper(walking());
+  const Frames frames = walk_there_and_back(30);
+  std::mt19937 random(5);
+  for (const std::size_t wanted : {5u, 50u, 90u, 140u, 200u}) {
+    const pid_t child = start_child(path_);
+    const std::string frames_done = path_ + "_frames";
+    const auto count = [&] { return std::filesystem::exists(frames_done) ? std::filesystem::file_size(frames_done) : 0; };
+    for (int wait = 0; wait < 60000 && count() < wanted; ++wait) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 20000));
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "it ended by itself";
+    const std::size_t last = count();
+    ASSERT_GE(last, wanted);
+
+    const std::vector<Surfel> found = stored();
+    while (maps.size() <= last + 1 && maps.size() <= frames.size()) {
+      mapper.integrate(frames[maps.size() - 1].view());
+      maps.push_back(mapper.surfels());
+      if (maps.size() > 40) maps[maps.size() - 40] = {};
+    }
+    std::size_t n = maps.size();
+    while (n > 0 && (found.size() != maps[n - 1].size() || !same(found, sorted(maps[n - 1])))) --n;
+    ASSERT_GT(n, 0u) << "killed after frame " << last << ": the map is none of any frame";
+    EXPECT_GE(n - 1 + 30, last) << "more is lost than allowed";
+    std::cout << "killed after frame " << last << ", the folder holds the map after frame " << n - 1 << "\n";
+
+    Mapper again(walking(path_));
+    EXPECT_NO_THROW(again.integrate(frames[last].view()));
+    again.reset();
+    std::filesystem::remove(frames_done);
+  }
+}
+
+void limit_file_size(bool full) {
+  rlimit now;
+  getrlimit(RLIMIT_FSIZE, &now);
+  now.rlim_cur = full ? rlim_t{1} << 20 : now.rlim_max;
+  setrlimit(RLIMIT_FSIZE, &now);
+}
+
+/// Frames are refused now and then, nothing is lost, and mapping goes on when there is room again.
+TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
+  const Frames frames = walk_there_and_back(20);
+  Mapper plain(walking());
+  integrate_all(plain, frames);
+  std::signal(SIGXFSZ, SIG_IGN);  // write() then fails
+  std::size_t refused = 0;
+  std::string said;
+  {
+    Mapper mapper(walking(path_));
+    Follower follower;
+    for (std::size_t n = 0; n < frames.size(); ++n) {
+      limit_file_size(n > 30 && n < 140);
+      for (int tries = 0;; ++tries) {
+        EXPECT_LT(tries, 2) << "frame " << n << ": " << said;
+        const std::string fault = fault_of<FileError>([&] { mapper.integrate(frames[n].view()); });
+        follower.apply(mapper.changes(follower.sequence()));
+        ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "frame " << n << ", try " << tries;
+        if (fault.empty()) break;
+        ++refused;
+        said = fault;
+      }
+      ASSERT_EQ(mapper.sequence(), n + 1);
+    }
+    limit_file_size(false);
+    EXPECT_TRUE(same(saved(mapper), sorted(plain.surfels())));
+  }
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_GT(refused, 0u);
+  EXPECT_LT(refused, 10u) << "not every frame";
+  EXPECT_TRUE(contains(said, "The map folder " + path_ + " cannot be") && said.back() == '.') << said;
+  EXPECT_TRUE(same(stored(), sorted(plain.surfels())));
+  std::cout << refused << " of " << frames.size() << " frames refused: " << said << "\n";
+}
+
+/// Some blocks come, then one cannot be read: the frame is refused, and changes() tells what has come.
+TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
+  const Frames there = walk_there(20), all = walk_there_and_back(20);
+  Mapper plain(walking()), mapper(walking(path_));
+  integrate_all(plain, all);
+  Follower follower;
+  const auto damage = [&] { Database((std::filesystem::path(path_) / "map.sqlite").string()).run("UPDATE blocks SET crc = ~crc"); };
+  for (const auto& frame : there) mapper.integrate(frame.view());
+  follower.apply(mapper.changes(0));
+  std::size_t refused = 0;
+  for (std::size_t n = there.size(); n < all.size(); ++n) {
+    const bool now = n == there.size() + 20;
+    if (now) damage();
+    for (int tries = 0; tries < 3 && now; ++tries) {
+      const std::vector<Surfel> before = mapper.surfels();
+      const std::string said = fault_of<FileError>([&] { mapper.integrate(there.front().view()); });
+      EXPECT_TRUE(contains(said, "cannot be read (its checksum does not fit)")) << said;
+      EXPECT_EQ(!same(before, mapper.surfels()), tries == 0) << "blocks have moved";
+      const Changes changes = mapper.changes(follower.sequence());
+      EXPECT_EQ(changes.sequence, n);
+      follower.apply(changes);
+      ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "after a refused frame";
+      ++refused;
+    }
+    if (now) damage();  // and whole again
+    mapper.integrate(all[n].view());
+    follower.apply(mapper.changes(follower.sequence()));
+    ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "frame " << n;
+  }
+  EXPECT_EQ(refused, 3u);
+  EXPECT_TRUE(same(saved(mapper), sorted(plain.surfels())));
+}
+
+/// The views that a frame has failed in are forgotten: blocks that have moved since are not taken for empty ones.
+TEST_F(MapperArchive, BadFramesBetweenChangeNothing) {
+  const Frames frames = walk_there_and_back(12);
+  Mapper plain(walking()), mapper(walking(path_));
+  for (const auto& frame : frames) {
+    plain.integrate(frame.view());
+    auto bad = frame;
+    bad.intrinsics.fx = bad.intrinsics.fy = 0.02;  // a grid as wide as a city
+    EXPECT_THROW(mapper.integrate(bad.view()), Error);
+    bad = frame;
+    bad.T_world_camera.translation().x() = 1e9;
+    EXPECT_THROW(mapper.integrate(bad.view()), BadFrame);
+    mapper.integrate(frame.view());
+  }
+  EXPECT_TRUE(same(saved(mapper), sorted(plain.surfels())));
+}
+
+TEST_F(MapperArchive, UnusableFoldersAreRefusedWithASentence) {
+  const auto refusal = [](const Config& config) { return fault_of<Error>([&] { Mapper mapper(config); }); };
+  {
+    const Mapper first(walking(path_));
+    const std::string said = refusal(walking(path_));
+    EXPECT_TRUE(contains(said, "in use by another running mapper")) << said;
+  }
+  EXPECT_EQ(refusal(walking(path_)), "") << "free again";
+
+  Config config = walking(path_);
+  config.eviction_radius = 4.4;
+  EXPECT_TRUE(contains(refusal(config), "eviction_radius is 4.4 m: it must be at least three times z_max")) << refusal(config);
+  config.map_folder.clear();
+  EXPECT_EQ(refusal(config), "");
+  config = walking(path_);
+  config.z_max = 20;
+  config.eviction_radius = 60;
+  EXPECT_TRUE(contains(refusal(config), "has blocks of 0.5 m, not of 1 m")) << refusal(config);
+
+  std::ofstream(root_ / "file") << "no folder";
+  const std::string said = refusal(walking((root_ / "file" / "map").string()));
+  EXPECT_TRUE(contains(said, "cannot be made") && said.back() == '.') << said;
+}
+
+}  // namespace
+}  // namespace frontier_surfels
