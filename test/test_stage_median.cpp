@@ -18,8 +18,13 @@ void check(Camera camera, double density, int votes) {
   probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
   const Field<char> known = random_field(probe.grid(), density, random);
   probe.set_known(known);
+  const Field<char> candidates = random_field(probe.grid(), 0.01, random);
+  probe.set_candidates(candidates);
   probe.stages().filter_median();
-  expect_equal("K~", median(known, votes), probe.filtered());
+  Field<char> expected = median(known, votes), filtered = probe.filtered();  // where there are candidates
+  for (std::size_t n = 0; n < candidates.values.size(); ++n)
+    if (!candidates.values[n]) expected.values[n] = filtered.values[n] = 0;
+  expect_equal("K~", expected, filtered);
 }
 
 TEST(StageMedian, RandomFields) {
