@@ -15,11 +15,15 @@ INLINE ulong layer_below(const Grid* g, __global const ulong* field, int i, int 
 }
 
 // One work item a word: 64 counts at once, bit n of a count in plane n.
-//   in  known: K', zero beyond the last layer;  candidates: only words with one of them are computed;   out filtered: K~
+//   in  known: K', zero beyond the last layer;  candidates: in words without one K~ is 0, as nobody asks;   out filtered: K~
 __kernel void median(const Grid g, const Limits limits, __global const ulong* known, __global const ulong* candidates,
                      __global ulong* filtered) {
   const int word = get_global_id(0);
-  if (word >= g.size_i * g.size_j * g.words_k || candidates[word] == 0) return;
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  if (candidates[word] == 0) {
+    filtered[word] = 0;
+    return;
+  }
   const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const ulong layers = valid_layers(&g, w);
 
