@@ -138,7 +138,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   pages_changed = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
-  report.device_bytes = commands.allocated_bytes();
+  report.device_bytes = commands.allocated_bytes() - map.untouched_bytes();
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
@@ -216,7 +216,7 @@ Statistics Mapper::statistics() const {
   for (const Surfel& surfel : surfels()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
   statistics.surfels = statistics.occupied + statistics.frontier;
   statistics.map_bytes = impl_->map.bytes();
-  statistics.device_bytes = impl_->commands.allocated_bytes();
+  statistics.device_bytes = impl_->commands.allocated_bytes() - impl_->map.untouched_bytes();
   return statistics;
 }
 

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kGroup = 64;       // work items of a group, where kernels do not say otherwise
 constexpr std::size_t kGroupOfPage = 8;  // of kernels whose work items do eight surfels each
-constexpr double kHullReach = 2;         // times z_max: surfels further from the grid say nothing of the paths that enter it
+constexpr double kHullReach = 1;         // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
   Limits limits = {};

@@ -379,9 +379,14 @@ void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
 }
 
 std::size_t SurfelMap::bytes() const {
-  if (!commands_.device().is_cpu) return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() + index_.bytes();
+  const std::size_t allocated = surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes();
+  return allocated - untouched_bytes() + index_.bytes();
+}
+
+std::size_t SurfelMap::untouched_bytes() const {
+  if (!commands_.device().is_cpu) return 0;
   constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + 2 * sizeof(cl_ulong) + sizeof(cl_int4);
-  return kPage * index_.end() + index_.bytes();
+  return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() - kPage * index_.end();
 }
 
 }  // namespace frontier_surfels

@@ -21,7 +21,8 @@ class SurfelMap {
   SurfelMap(Commands& commands, Lists& lists, const Config& config);
 
   std::size_t size() const { return size_; }
-  std::size_t bytes() const;  ///< of all that holds surfels, or says where they are, on the device and on the host
+  std::size_t bytes() const;            ///< of all that holds surfels, or says where they are, on the device and on the host
+  std::size_t untouched_bytes() const;  ///< of buffers on a CPU, which the operating system has not given yet
 
   /// @name A frame. Kernels work on the pages of the window, and mark in `alive` and `changed` what they remove and change.
   /// @{
