@@ -100,12 +100,12 @@ Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* aro
 //   in  created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
 //       refine: whether they leave their voxel's centre and mean normal
 //       view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of settle_candidates;  depths: their images
-//   out placed[LANES chunks]: centre, camera frame, and radius [m];  normals[LANES chunks]: camera frame, and attributes as bits
-__kernel void shape_surfels(const Grid g, const Limits limits, const int refine, const View view, __global const View* views,
-                            __global const ushort* tile_views, const int view_groups, __global const float* depths,
-                            __global const float* layer_depth, __global const int* created, const int count, __global const int* voxels,
-                            __global const int* around, __global const float* directions, __global float4* placed,
-                            __global float4* normals) {
+//   out new_surfels[count], new_cells[count]: for the map
+__kernel void create_surfels(const Grid g, const Limits limits, const Window window, const Transform T_local_camera, const int refine,
+                             const View view, __global const View* views, __global const ushort* tile_views, const int view_groups,
+                             __global const float* depths, __global const float* layer_depth, __global const int* created, const int count,
+                             __global const int* voxels, __global const int* around, __global const float* directions,
+                             __global uint4* new_surfels, __global uint* new_cells) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   int16 exist, ragged = 0;
@@ -129,22 +129,11 @@ __kernel void shape_surfels(const Grid g, const Limits limits, const int refine,
   vstore16(normal.y, 0, shaped[5]);
   vstore16(normal.z, 0, shaped[6]);
   vstore16(as_float16(ragged ? (int16)(SURFEL_RAGGED) : 0), 0, shaped[7]);
-  for (int n = 0; n < LANES; ++n) {
-    placed[chunk * LANES + n] = (float4)(shaped[0][n], shaped[1][n], shaped[2][n], shaped[3][n]);
-    normals[chunk * LANES + n] = (float4)(shaped[4][n], shaped[5][n], shaped[6][n], shaped[7][n]);
+  for (int n = 0; n < LANES && chunk * LANES + n < count; ++n) {
+    const float3 position = transform_point(&T_local_camera, (float3)(shaped[0][n], shaped[1][n], shaped[2][n]));
+    const float3 direction = rotate(&T_local_camera, (float3)(shaped[4][n], shaped[5][n], shaped[6][n]));
+    uint cell;
+    new_surfels[chunk * LANES + n] = pack_surfel(&window, position, shaped[3][n], direction, as_uint(shaped[7][n]), &cell);
+    new_cells[chunk * LANES + n] = cell;
   }
-}
-
-// One work item a new surfel.
-//   in  placed[count], normals[count]: of shape_surfels
-//   out new_surfels, new_cells: for the map
-__kernel void create_surfels(const Window window, const Transform T_local_camera, __global const float4* placed,
-                             __global const float4* normals, const uint count, __global uint4* new_surfels, __global uint* new_cells) {
-  const uint n = get_global_id(0);
-  if (n >= count) return;
-  const float4 p = placed[n], normal = normals[n];
-  uint cell;
-  new_surfels[n] =
-      pack_surfel(&window, transform_point(&T_local_camera, p.xyz), p.w, rotate(&T_local_camera, normal.xyz), as_uint(normal.w), &cell);
-  new_cells[n] = cell;
 }

@@ -62,8 +62,6 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       around_(commands),
       created_(commands),
       directions_(commands),
-      placed_(commands),
-      placed_normals_(commands),
       in_view_bits_(commands),
       large_bits_(commands),
       removed_bits_(commands),
@@ -302,13 +300,10 @@ std::size_t Stages::remove_surfels() {
 
 std::size_t Stages::create_surfels() {
   const char* stage = "creation";
-  placed_.resize(chunks(created_count_) * LANES);
-  placed_normals_.resize(chunks(created_count_) * LANES);
-  commands_.run(stage, "shape_surfels", chunks(created_count_), large_group(), grid_, limits_, static_cast<cl_int>(config_.refine_surfels),
-                own_view(), views_.views(), tile_views_(), static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(),
-                created_(), static_cast<cl_int>(created_count_), listed_voxels_(), around_(), directions_(), placed_(), placed_normals_());
-  commands_.run(stage, "create_surfels", created_count_, kGroup, window_, T_local_camera_, placed_(), placed_normals_(),
-                static_cast<cl_uint>(created_count_), new_surfels_(), new_cells_());
+  commands_.run(stage, "create_surfels", chunks(created_count_), large_group(), grid_, limits_, window_, T_local_camera_,
+                static_cast<cl_int>(config_.refine_surfels), own_view(), views_.views(), tile_views_(),
+                static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), created_(), static_cast<cl_int>(created_count_),
+                listed_voxels_(), around_(), directions_(), new_surfels_(), new_cells_());
   map_.insert(stage, new_surfels_, new_cells_, created_count_);
   return created_count_;
 }

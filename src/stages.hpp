@@ -93,7 +93,6 @@ class Stages {
   DeviceArray<cl_uint> listed_voxels_, kept_offsets_;
   DeviceArray<cl_int> around_, created_;
   DeviceArray<float> directions_;
-  DeviceArray<cl_float4> placed_, placed_normals_;
 
   // Surfels in view
   DeviceArray<cl_ulong> in_view_bits_, large_bits_, removed_bits_;
