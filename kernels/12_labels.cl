@@ -23,7 +23,7 @@ __kernel __attribute__((reqd_work_group_size(8, 1, 1))) void label_surfels(const
   vstore8(k, 0, layer);
   vstore8(s.z, 0, z);
   for (uint left = lanes & lanes_of(open); left != 0; left &= left - 1) {
-    const int n = 31 - (int)clz(left & -left);
+    const int n = lowest_lane(left);
     if (!at_surface(&g, depth[pixel[n]], column_end[pixel[n]], limits.surface_depth, layer[n], z[n])) continue;
     uint labelled = surfels[first + n].w | SURFEL_OCCUPIED;
     if (has_color && (labelled & SURFEL_COLORED) == 0) labelled = (labelled & 0xff000000u) | SURFEL_COLORED | color[pixel[n]];

@@ -53,13 +53,6 @@ INLINE float3 from_grid(const Grid* g, float3 c) {
   return (float3)((c.x - g->center_i) * z / g->fx, (c.y - g->center_j) * z / g->fy, z);
 }
 
-// F^-1 of a voxel's centre.
-//   layer_depth[size_k]: z of each layer's centre [m]
-INLINE float3 voxel_center(const Grid* g, __global const float* layer_depth, int3 v) {
-  const float z = layer_depth[v.z], dx = (float)v.x - g->center_i, dy = (float)v.y - g->center_j;
-  return (float)v.z < g->k_min ? (float3)(dx * g->z_min / g->fx, dy * g->z_min / g->fy, z) : (float3)(dx * z / g->fx, dy * z / g->fy, z);
-}
-
 INLINE int3 voxel_of(float3 c) { return (int3)(floor_int(c.x + 0.5f), floor_int(c.y + 0.5f), floor_int(c.z + 0.5f)); }
 
 INLINE bool inside_grid(const Grid* g, int3 v) {
@@ -81,14 +74,10 @@ INLINE ulong bit_run(int from, int to) {
   return below_to & ~((1ul << from) - 1);  // from < to <= 64, so the shift is defined
 }
 
-// The word whose bit n is mark[n], 0 or 1.
-INLINE ulong pack_marks(__local const uchar* mark) {
-  ulong bits = 0;
-  for (int n = 0; n < 64; ++n) bits |= (ulong)mark[n] << n;
-  return bits;
-}
-
 INLINE int lowest_bit(ulong bits) { return 63 - (int)clz(bits & -bits); }
+
+// The same of fewer bits, a lane each of a vector.
+INLINE int lowest_lane(uint bits) { return 31 - (int)clz(bits & -bits); }
 
 INLINE int highest_bit(ulong bits) { return 63 - (int)clz(bits); }
 

@@ -21,8 +21,8 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
   column_end[pixel] = d > 0.0f ? low : 0;
 }
 
-// One work item a word, dimensions i, w and j: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid pixel's ray has its sample of
-// that layer in it, that is, iff there is one in a fixed rectangle of the image.
+// One work item a word, dimensions i, w and j: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid
+// pixel's ray has its sample of that layer in it, that is, iff there is one in a fixed rectangle of the image.
 //   in  column_end[height][width];  valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
 //       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies
 //       there
@@ -50,16 +50,9 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
   observed[word_index(&g, i, j, w)] = bits & valid_layers(&g, w);
 }
 
-// Exact membership in the space that one view has seen (its pixel there is valid and lies deeper).
-//   depths: all views' images;  p: in the view's camera frame [m]
-INLINE bool view_knows(const View* view, __global const float* depths, float3 p) {
-  if (!(p.z > 0.0f)) return false;
-  const float s = p.x * view->fx / p.z + view->cx + 0.5f, t = p.y * view->fy / p.z + view->cy + 0.5f;
-  if (!(s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height)) return false;
-  return p.z < fabs(depths[view->first_pixel + (int)t * view->width + (int)s]);
-}
-
-// The same for eight points. @return -1 (all bits) where the view knows the point
+// Exact membership of eight points in the space that one view has seen (its pixel there is valid and lies deeper).
+//   depths: all views' images;  x, y, z: in the view's camera frame [m]
+// @return -1 (all bits) where the view knows the point
 INLINE int8 view_knows_eight(const View* view, __global const float* depths, float8 x, float8 y, float8 z) {
   const float8 s = x * view->fx / z + view->cx + 0.5f, t = y * view->fy / z + view->cy + 0.5f;
   const int8 seen = z > 0.0f && s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height;
@@ -68,12 +61,6 @@ INLINE int8 view_knows_eight(const View* view, __global const float* depths, flo
   const float8 d = (float8)(depth[pixel.s0], depth[pixel.s1], depth[pixel.s2], depth[pixel.s3], depth[pixel.s4], depth[pixel.s5],
                             depth[pixel.s6], depth[pixel.s7]);
   return seen && z < fabs(d);
-}
-
-// Pixel whose column of voxels holds v, -1 if it is in the padding.
-INLINE int pixel_of(const Grid* g, int3 v) {
-  const int s = v.x - g->padding_i, t = v.y - g->padding_j;
-  return s < 0 || t < 0 || s >= g->width || t >= g->height ? -1 : t * g->width + s;
 }
 
 // Is layer k of a pixel's column, or a point there at depth z, at the measured surface that ended the column, or at most `surface_depth`

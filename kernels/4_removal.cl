@@ -33,7 +33,7 @@ __kernel __attribute__((reqd_work_group_size(8, 1, 1))) void mark_removed(
     vstore8((j * g.words_k + (k >> 6)) * g.size_i + i, 0, word);
     vstore8(k, 0, layer);
     for (uint left = inside & ~gone; left != 0; left &= left - 1) {
-      const int n = 31 - (int)clz(left & -left);
+      const int n = lowest_lane(left);
       if ((observed[word[n]] >> (layer[n] & 63)) & 1) {
         gone |= 1u << n;
       } else {

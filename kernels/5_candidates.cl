@@ -14,15 +14,13 @@ INLINE uint lane_bits(int16 marks) {
   return (uint)(of_2.x | of_2.y);
 }
 
-INLINE int lowest_lane(uint bits) { return 31 - (int)clz(bits & -bits); }
-
 #define GATHER(values, at)                                                                                                               \
   values[at.s0], values[at.s1], values[at.s2], values[at.s3], values[at.s4], values[at.s5], values[at.s6], values[at.s7], values[at.s8], \
       values[at.s9], values[at.sa], values[at.sb], values[at.sc], values[at.sd], values[at.se], values[at.sf]
 
 INLINE float16 gather(__global const float* values, int16 at) { return (float16)(GATHER(values, at)); }
 
-// view_knows of 2_observed_space, for those lanes that are asked.
+// view_knows_eight of 2_observed_space, of sixteen points, for those lanes that are asked.
 INLINE int16 knows(const View* view, __global const float* depths, float16 x, float16 y, float16 z, int16 asked) {
   const float16 s = x * view->fx / z + view->cx + 0.5f, t = y * view->fy / z + view->cy + 0.5f;
   const int16 seen = asked & (z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
@@ -71,7 +69,7 @@ INLINE Voxels voxels_of(const Grid* g, int16 numbers) {
   return v;
 }
 
-// voxel_center of 1_grid.
+// F^-1 of voxels' centres.
 INLINE Points voxel_centers(const Grid* g, __global const float* layer_depth, Voxels v) {
   Points p;
   p.z = gather(layer_depth, clamp(v.k, 0, g->size_k - 1));

@@ -123,8 +123,8 @@ INLINE int column_bits(const Grid* g, int3 tile, int column) {
 
 // What a work-group knows of its tile.
 typedef struct {
-  uint open[TILE_COLUMNS];  // layers with a candidate
-  uint layers;              // those of all columns
+  uint open[TILE_COLUMNS];                                                    // layers with a candidate
+  uint layers;                                                                // those of all columns
   ushort entries[TILE_COLUMNS * VIEW_TILE_K + LANES], settled[TILE_COLUMNS];  // the candidates; those of each chunk that are settled
   uint entry_count;
   ushort views[MOST_VIEWS];
@@ -183,8 +183,8 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
   if (tile.layers == 0) return;
 
   const int first_layer = at.z * VIEW_TILE_K;
-  const Box box = tile_box(&g, layer_depth, at.x, at.y, first_layer + lowest_lane(tile.layers),
-                           first_layer + 31 - (int)clz(tile.layers), min_gap);
+  const Box box =
+      tile_box(&g, layer_depth, at.x, at.y, first_layer + lowest_lane(tile.layers), first_layer + 31 - (int)clz(tile.layers), min_gap);
   __global ushort* own_views = tile_views + number * view_groups;
   for (int group = lane; group < view_groups; group += lanes)
     own_views[group] = (ushort)views_of_box(view_lanes + group * VIEW_LANE_FIELDS * LANES, views + group * LANES, block_depths, &box);

@@ -104,7 +104,7 @@ __kernel void project_hull(const Grid g, const Limits limits, const Window windo
   const int8 beyond = ((i < 0 || i >= g.size_i) && near_j && near_k) || ((j < 0 || j >= g.size_j) && near_i && near_k) ||
                       ((k < 0 || k >= g.size_k) && near_i && near_j);
   for (uint left = lanes & lanes_of(beyond); left != 0; left &= left - 1) {
-    const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + 31 - (int)clz(left & -left));
+    const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + lowest_lane(left));
     enter_surfel(&g, &limits, &v, lines, faces);
   }
 }

@@ -41,6 +41,7 @@ struct Mapper::Impl {
   void finish_frame();
   void fetch_blocks(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
   void begin_map(const std::vector<Surfel>& surfels);
+  std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
 
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
@@ -138,7 +139,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   pages_changed = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
-  report.device_bytes = commands.allocated_bytes() - map.untouched_bytes();
+  report.device_bytes = device_bytes();
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
@@ -216,7 +217,7 @@ Statistics Mapper::statistics() const {
   for (const Surfel& surfel : surfels()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
   statistics.surfels = statistics.occupied + statistics.frontier;
   statistics.map_bytes = impl_->map.bytes();
-  statistics.device_bytes = impl_->commands.allocated_bytes() - impl_->map.untouched_bytes();
+  statistics.device_bytes = impl_->device_bytes();
   return statistics;
 }
 

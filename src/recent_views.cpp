@@ -96,7 +96,7 @@ View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_camera_so
   return view;
 }
 
-View RecentViews::current_view() const { return to_view(current_, current_.T_world_camera.inverse()); }
+View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d::Identity()); }
 
 int RecentViews::prepare() {
   std::vector<View> views;

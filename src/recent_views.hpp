@@ -19,9 +19,9 @@ class RecentViews {
  public:
   RecentViews(Commands& commands, const Config& config);
 
-  /// Sends this frame's depths to the device; they are current_view()'s until the next call.
+  /// Sends this frame's depths to the device; they are own_view()'s until the next call.
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
-  View current_view() const;
+  View own_view() const;  ///< this frame's, as its own camera sees it
 
   /// Sends the kept views, newest first, each with its pose relative to the current camera. @return how many there are
   int prepare();

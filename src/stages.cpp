@@ -94,7 +94,6 @@ void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_w
   color_.resize(1);
   color_.write(image.color);
   views_.set_current(image, T_world_camera);
-  view_ = views_.current_view();
 }
 
 void Stages::set_grid(const WorkingImage& image) {
@@ -126,12 +125,6 @@ void Stages::allocate_paths() {
   hull_.allocate(2 * (j * w + i * w + i * j));
 }
 
-View Stages::own_view() const {
-  View own = view_;
-  own.T_camera_world = to_transform(Eigen::Isometry3d::Identity());
-  return own;
-}
-
 cl::NDRange Stages::word_range() const {
   return {(grid_.size_i + kGroup - 1) / kGroup * kGroup, static_cast<std::size_t>(grid_.words_k), static_cast<std::size_t>(grid_.size_j)};
 }
@@ -144,14 +137,18 @@ void Stages::observe_space() {
                 pixels_j_(), observed_());
 }
 
-std::size_t Stages::select_in_view() {
+void Stages::mark_in_view() {
   const char* stage = "in_view";
   const std::size_t pages = map_.window_pages();
   in_view_bits_.resize(pages + 1);
   large_bits_.resize(pages + 1);
   commands_.run(stage, "mark_in_view", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, map_.pages(),
                 map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_(), large_bits_());
-  return lists_.count_bits(stage, in_view_bits_, pages);
+}
+
+std::size_t Stages::select_in_view() {
+  mark_in_view();
+  return lists_.count_bits("in_view", in_view_bits_, map_.window_pages());
 }
 
 std::size_t Stages::split_surfels() {
@@ -170,7 +167,7 @@ std::size_t Stages::split_surfels() {
                 split_slots_(), parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
   map_.removed(parents);
   map_.insert(stage, new_surfels_, new_cells_, children);
-  select_in_view();
+  mark_in_view();  // the children instead of their parents
   return children - parents;
 }
 
@@ -231,7 +228,7 @@ void Stages::mark_removed() {
   const std::size_t pages = map_.window_pages();
   occupied_voxels_.fill(stage, 0, words());
   removed_bits_.resize(pages + 1);
-  commands_.run(stage, "mark_removed", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, own_view(),
+  commands_.run(stage, "mark_removed", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, views_.own_view(),
                 static_cast<cl_int>(config_.remove_buried), views_.depths(), map_.pages(), in_view_bits_(), map_.page_block(),
                 map_.surfels(), observed_(), occupied_voxels_(), removed_bits_());
 }
@@ -255,9 +252,9 @@ void Stages::settle_by_recent_views() {
   list_candidates();
   tile_views_.resize(1);
   if (config_.min_gap > 0)
-    commands_.run(stage, "close_gaps", chunks(listed_count_), large_group(), grid_, limits_, own_view(), views_.views(), tile_views_(),
-                  static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), depth_(), column_end_(), listed_voxels_(),
-                  static_cast<cl_int>(listed_count_), directions_(), candidates_());
+    commands_.run(stage, "close_gaps", chunks(listed_count_), large_group(), grid_, limits_, views_.own_view(), views_.views(),
+                  tile_views_(), static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), depth_(), column_end_(),
+                  listed_voxels_(), static_cast<cl_int>(listed_count_), directions_(), candidates_());
   if (!is_open()) return;
   allocate_paths();
   lines_.fill(stage, 0, line_numbers());
@@ -301,7 +298,7 @@ std::size_t Stages::remove_surfels() {
 std::size_t Stages::create_surfels() {
   const char* stage = "creation";
   commands_.run(stage, "create_surfels", chunks(created_count_), large_group(), grid_, limits_, window_, T_local_camera_,
-                static_cast<cl_int>(config_.refine_surfels), own_view(), views_.views(), tile_views_(),
+                static_cast<cl_int>(config_.refine_surfels), views_.own_view(), views_.views(), tile_views_(),
                 static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), created_(), static_cast<cl_int>(created_count_),
                 listed_voxels_(), around_(), directions_(), new_surfels_(), new_cells_());
   map_.insert(stage, new_surfels_, new_cells_, created_count_);

@@ -52,6 +52,7 @@ class Stages {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
+  void mark_in_view();
   void place_surfels();
   void list_candidates();  ///< and the direction to the observed space around each
   void set_grid(const WorkingImage& image);
@@ -59,7 +60,6 @@ class Stages {
   void allocate_paths();
   cl::NDRange word_range() const;   ///< a work item for each word, by i, w and j
   std::size_t large_group() const;  ///< work items of a group where one item has much to do
-  View own_view() const;            ///< this frame's, as the camera itself sees it
 
   Commands& commands_;
   Lists& lists_;
@@ -73,7 +73,6 @@ class Stages {
   Grid grid_ = {};
   Transform T_camera_local_ = {}, T_local_camera_ = {};
   Window window_ = {};
-  View view_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
   std::size_t in_view_ = 0, listed_count_ = 0, created_count_ = 0;

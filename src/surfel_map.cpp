@@ -150,8 +150,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   missing_.resize(cell_count);
   commands_.run(stage, "count_missing_pages", cell_count, kGroup, cell_begin_(), cell_pages_list_(), free_before_(), cell_count,
                 missing_());
-  add_pages(missing_.read(cell_count));
-  count_free(stage);
+  add_pages(stage, missing_.read(cell_count));
 
   commands_.run(stage, "fill_pages", window_pages(), kGroup, pages_list_(), page_cells_list_(), static_cast<cl_uint>(window_pages()),
                 cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_());
@@ -166,7 +165,7 @@ void SurfelMap::count_free(const char* stage) {
 }
 
 /// @param missing  pages that each cell's block needs
-void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
+void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing) {
   grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
   std::vector<Page> pages;
   std::vector<cl_int4> blocks;
@@ -180,9 +179,10 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   if (pages.empty()) return;
   new_pages_.write(pages);
   new_blocks_.write(blocks);
-  commands_.run("in_view", "begin_new_pages", pages.size(), kGroup, new_pages_(), new_blocks_(), static_cast<cl_uint>(pages.size()),
-                alive_(), changed_(), page_block_());
+  commands_.run(stage, "begin_new_pages", pages.size(), kGroup, new_pages_(), new_blocks_(), static_cast<cl_uint>(pages.size()), alive_(),
+                changed_(), page_block_());
   list_window();
+  count_free(stage);
 }
 
 std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
@@ -378,15 +378,14 @@ void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   }
 }
 
-std::size_t SurfelMap::bytes() const {
-  const std::size_t allocated = surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes();
-  return allocated - untouched_bytes() + index_.bytes();
-}
+std::size_t SurfelMap::allocated_bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes(); }
+
+std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes(); }
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;
   constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + 2 * sizeof(cl_ulong) + sizeof(cl_int4);
-  return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes() - kPage * index_.end();
+  return allocated_bytes() - kPage * index_.end();
 }
 
 }  // namespace frontier_surfels

@@ -90,7 +90,8 @@ class SurfelMap {
   double window_margin(const Grid& grid) const;
   void list_window();
   void close_window();
-  void add_pages(const std::vector<cl_uint>& missing);
+  void add_pages(const char* stage, const std::vector<cl_uint>& missing);
+  std::size_t allocated_bytes() const;
   void count_free(const char* stage);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
 
