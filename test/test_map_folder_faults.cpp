@@ -1,7 +1,6 @@
 /// Map folders whose process is killed, or whose disk is full.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <iostream>
 #include <thread>
 
+#include "file_size_limit.hpp"
 #include "map_folder_input.hpp"
 
 namespace frontier_surfels {
@@ -166,16 +166,9 @@ void expect_nothing_lost(const std::string& path, const std::function<void(bool)
   EXPECT_EQ(content_of(folder), expected);
 }
 
-void limit_file_size(bool full) {
-  rlimit now;
-  getrlimit(RLIMIT_FSIZE, &now);
-  now.rlim_cur = full ? rlim_t{4} << 20 : now.rlim_max;
-  setrlimit(RLIMIT_FSIZE, &now);
-}
-
 TEST_F(MapFolderFaults, NothingIsLostWhenAFileMayNotGrow) {
   std::signal(SIGXFSZ, SIG_IGN);  // write() then fails
-  expect_nothing_lost(path_, limit_file_size);
+  expect_nothing_lost(path_, [](bool full) { limit_file_size(full); });
   std::signal(SIGXFSZ, SIG_DFL);
   MapFolder(path_, kBlockSize);
 }

@@ -1,6 +1,5 @@
 /// Map folders whose mapper is killed, whose disk is full or damaged, or that cannot be used.
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <chrono>
@@ -10,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "file_size_limit.hpp"
 #include "mapper_archive_input.hpp"
 #include "sqlite.hpp"
 
@@ -84,13 +84,6 @@ TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
   }
 }
 
-void limit_file_size(bool full) {
-  rlimit now;
-  getrlimit(RLIMIT_FSIZE, &now);
-  now.rlim_cur = full ? rlim_t{1} << 20 : now.rlim_max;
-  setrlimit(RLIMIT_FSIZE, &now);
-}
-
 /// Frames are refused now and then, nothing is lost, and mapping goes on when there is room again.
 TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
   const Frames frames = walk_there_and_back(20);
@@ -103,7 +96,7 @@ TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
     Mapper mapper(walking(path_));
     Follower follower;
     for (std::size_t n = 0; n < frames.size(); ++n) {
-      limit_file_size(n > 30 && n < 140);
+      limit_file_size(n > 30 && n < 140, rlim_t{1} << 20);
       for (int tries = 0;; ++tries) {
         EXPECT_LT(tries, 2) << "frame " << n << ": " << said;
         const std::string fault = fault_of<FileError>([&] { mapper.integrate(frames[n].view()); });

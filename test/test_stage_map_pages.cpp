@@ -283,15 +283,10 @@ TEST(StageMapPages, ChangesAreTold) {
 }
 
 TEST(StageMapPages, SlotsDoNotDependOnThreads) {
-  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
-  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end())
-    GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
-  Config one;
-  one.platform = test_platform();
-  one.threads = 1;
-  Commands one_thread(choose_device(one));
+  const auto one_thread = one_thread_commands();
+  if (one_thread == nullptr) GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
   std::vector<Book> books;
-  for (Commands* with : {&test_commands(), &one_thread}) {
+  for (Commands* with : {&test_commands(), one_thread.get()}) {
     Pages pages(5, *with);
     pages.fill(2000);
     for (int frame = 2; frame < 6; ++frame) {

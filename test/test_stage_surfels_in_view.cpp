@@ -352,16 +352,11 @@ TEST(StageSurfelsInView, Split) {
 }
 
 TEST(StageSurfelsInView, SplitDoesNotDependOnThreads) {
-  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
-  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end())
-    GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
-  Config one;
-  one.platform = test_platform();
-  one.threads = 1;
-  Commands one_thread(choose_device(one));
+  const auto one_thread = one_thread_commands();
+  if (one_thread == nullptr) GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
   const Camera camera = cameras().back();
   std::vector<std::vector<Surfel>> maps;
-  for (Commands* with : {&test_commands(), &one_thread}) {
+  for (Commands* with : {&test_commands(), one_thread.get()}) {
     Scene scene(camera, 500, 3, 20, 5, *with);
     scene.probe.stages().select_in_view();
     EXPECT_GT(scene.probe.stages().split_surfels(), 0u);

@@ -6,6 +6,7 @@
 
 #include "bench/sections.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "replay/command.hpp"
 #include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
 
@@ -26,10 +27,6 @@ const std::vector<Section>& sections() {
 namespace {
 
 using nlohmann::ordered_json;
-
-constexpr int kDone = 0;
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
 
 void declare_options(CLI::App& app, Options& options) {
   std::vector<std::string> names;
@@ -121,19 +118,9 @@ void measure_as_child(const Options& options) {
 }  // namespace frontier_surfels::bench
 
 int main(int argc, char** argv) {
-  using namespace frontier_surfels::bench;
-  try {
-    const Options options = parse(argc, argv);
-    options.child.empty() ? measure(options) : measure_as_child(options);
-    return kDone;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return kDone;
-    std::cerr << "bench: " << error.what() << "\n";
-    return kWrongUsage;
-  } catch (const std::bad_alloc&) {
-    std::cerr << "bench: out of memory: leave map_size out (--only), or take fewer frames (--frames).\n";
-  } catch (const std::exception& error) {
-    std::cerr << "bench: " << error.what() << "\n";
-  }
-  return kFailed;
+  using namespace frontier_surfels;
+  return replay::run_command("bench", "leave map_size out (--only), or take fewer frames (--frames).", [&] {
+    const bench::Options options = bench::parse(argc, argv);
+    options.child.empty() ? bench::measure(options) : bench::measure_as_child(options);
+  });
 }

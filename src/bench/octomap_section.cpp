@@ -8,7 +8,7 @@
 #include "bench/table.hpp"
 #include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
-#include "scoring/decimated_depth.hpp"
+#include "scoring/octomap_cloud.hpp"
 
 namespace frontier_surfels::bench {
 namespace {
@@ -22,29 +22,13 @@ struct Times {
   std::vector<double> wall_ms, cpu_ms;
 };
 
-/// The measured pixels of the mapper's working image, in the world.
-octomap::Pointcloud cloud_of(const DepthFrame& frame, const Config& config) {
-  const auto image = scoring::decimate(frame, {config.z_min, config.z_max, config.decimation});
-  const Intrinsics& camera = image.intrinsics;
-  octomap::Pointcloud cloud;
-  for (int t = 0; t < camera.height; ++t) {
-    for (int s = 0; s < camera.width; ++s) {
-      const double z = image.depth[static_cast<std::size_t>(t) * camera.width + s];
-      if (!(z > 0)) continue;
-      const Eigen::Vector3d p = frame.T_world_camera * Eigen::Vector3d((s - camera.cx) * z / camera.fx, (t - camera.cy) * z / camera.fy, z);
-      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
-    }
-  }
-  return cloud;
-}
-
 void insert(octomap::OcTree& tree, const DepthFrame& frame, const Config& config, Times& times) {
-  const octomap::Pointcloud cloud = cloud_of(frame, config);
-  const Eigen::Vector3f origin = frame.T_world_camera.translation().cast<float>();
+  // The pixels of the mapper's working image.
+  const octomap::Pointcloud cloud = scoring::to_octomap_cloud(frame, {config.z_min, config.z_max, config.decimation});
 
   const auto start = std::chrono::steady_clock::now();
   const double cpu_before_ms = replay::process_cpu_ms();
-  tree.insertPointCloud(cloud, octomap::point3d(origin.x(), origin.y(), origin.z()), config.z_max);
+  tree.insertPointCloud(cloud, scoring::octomap_origin(frame), config.z_max);
   times.cpu_ms.push_back(replay::process_cpu_ms() - cpu_before_ms);
   times.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
 }

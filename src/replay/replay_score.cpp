@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "frontier_surfels/ply.hpp"
+#include "replay/command.hpp"
 #include "replay/interrupt.hpp"
 #include "replay/live_replay.hpp"
 #include "replay/report_page.hpp"
@@ -19,10 +20,6 @@ namespace frontier_surfels::replay {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kDone = 0;
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
 
 /// The command line, checked.
 struct Options {
@@ -213,17 +210,6 @@ void replay_and_score(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace frontier_surfels::replay;
-  try {
-    replay_and_score(parse(argc, argv));
-    return kDone;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return kDone;
-    std::cerr << "replay_score: " << error.what() << "\n";
-    return kWrongUsage;
-  } catch (const std::bad_alloc&) {
-    std::cerr << "replay_score: out of memory: leave the OctoMap out (--octomap-resolution 0) or replay fewer frames (--last, --stride).\n";
-  } catch (const std::exception& error) {
-    std::cerr << "replay_score: " << error.what() << "\n";
-  }
-  return kFailed;
+  return run_command("replay_score", "leave the OctoMap out (--octomap-resolution 0) or replay fewer frames (--last, --stride).",
+                     [&] { replay_and_score(parse(argc, argv)); });
 }

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "decimated_depth.hpp"
+#include "octomap_cloud.hpp"
 #include "surfel_tree.hpp"
 
 namespace frontier_surfels::scoring {
@@ -96,23 +96,11 @@ OctomapTruth::OctomapTruth(double resolution, double z_min, double z_max, int de
 OctomapTruth::~OctomapTruth() = default;
 
 double OctomapTruth::add(const DepthFrame& frame) {
-  const DecimatedDepth decimated = decimate(frame, impl_->range);
-  const Intrinsics& camera = decimated.intrinsics;
-  octomap::Pointcloud cloud;
-  for (int t = 0; t < camera.height; ++t) {
-    for (int s = 0; s < camera.width; ++s) {
-      const double z = decimated.depth[static_cast<std::size_t>(t) * camera.width + s];
-      if (!(z > 0)) continue;
-      const Eigen::Vector3d p = frame.T_world_camera * Eigen::Vector3d((s - camera.cx) * z / camera.fx, (t - camera.cy) * z / camera.fy, z);
-      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
-    }
-  }
-  const Eigen::Vector3f origin = frame.T_world_camera.translation().cast<float>();
-
+  const octomap::Pointcloud cloud = to_octomap_cloud(frame, impl_->range);
   const auto start = std::chrono::steady_clock::now();
   // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is pruned at once, as
   // octomap_server does.
-  impl_->tree.insertPointCloud(cloud, octomap::point3d(origin.x(), origin.y(), origin.z()), -1, false, false);
+  impl_->tree.insertPointCloud(cloud, octomap_origin(frame), -1, false, false);
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 

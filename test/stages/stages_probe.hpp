@@ -38,6 +38,16 @@ inline Commands& test_commands() {
   return *commands;
 }
 
+/// The same with one thread; null where the device cannot be limited to that.
+inline std::unique_ptr<Commands> one_thread_commands() {
+  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end()) return nullptr;
+  Config one;
+  one.platform = test_platform();
+  one.threads = 1;
+  return std::make_unique<Commands>(choose_device(one));
+}
+
 /// The stages with one camera and everything that they work on.
 class StagesProbe {
  public:

@@ -1,0 +1,34 @@
+/// How a command of this package begins and ends.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <new>
+#include <string>
+
+namespace frontier_surfels::replay {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+/// Runs a command; what it throws becomes a sentence and an exit code.
+/// @param if_out_of_memory  what the user can do then
+template <typename Command>
+int run_command(const std::string& name, const std::string& if_out_of_memory, Command command) {
+  try {
+    command();
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return kDone;
+    std::cerr << name << ": " << error.what() << "\n";
+    return kWrongUsage;
+  } catch (const std::bad_alloc&) {
+    std::cerr << name << ": out of memory: " << if_out_of_memory << "\n";
+  } catch (const std::exception& error) {
+    std::cerr << name << ": " << error.what() << "\n";
+  }
+  return kFailed;
+}
+
+}  // namespace frontier_surfels::replay
