@@ -85,7 +85,7 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
 }
 
 std::vector<BlockKey> MapWindow::blocks_near(double distance, std::size_t most) const {
-  const int more = static_cast<int>(std::ceil(distance / window_.block_size));
+  const int more = static_cast<int>(std::floor(distance / window_.block_size)) + 1;  // those that only touch it, too, as is_near()
   const std::size_t size_x = window_.size_x + 2 * more, size_y = window_.size_y + 2 * more, size_z = window_.size_z + 2 * more;
   std::vector<BlockKey> blocks;
   if (size_x * size_y * size_z > most) return blocks;

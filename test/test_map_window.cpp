@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "map_window.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/stages_probe.hpp"
@@ -129,6 +131,30 @@ TEST(MapWindow, IsTheSameAnywhere) {
       for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(blocks[axis], 2 * shift[axis]);
       EXPECT_EQ(first.meets_grid(a), window.meets_grid(b));
     }
+  }
+}
+
+/// What a frame works on must not depend on which of the two ways finds it.
+TEST(MapWindow, BlocksNearAreThoseThatAreNear) {
+  Random random(3);
+  const Camera camera = cameras().front();
+  StagesProbe probe(camera.config);
+  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), random.pose(100, 3.1), 1);
+  const MapWindow& window = probe.map().window();
+  const Window& w = window.window();
+  for (const double distance : {0.0, 0.2, 0.5, 2.9, 3.0, 3.1}) {
+    std::set<BlockKey> near;
+    constexpr int kMore = 10;  // blocks
+    for (int z = -kMore; z < w.size_z + kMore; ++z)
+      for (int y = -kMore; y < w.size_y + kMore; ++y)
+        for (int x = -kMore; x < w.size_x + kMore; ++x) {
+          const BlockKey block = {w.origin_x + x, w.origin_y + y, w.origin_z + z};
+          if (window.is_near(block, distance)) near.insert(block);
+        }
+    const std::vector<BlockKey> listed = window.blocks_near(distance, near.size());
+    EXPECT_EQ(std::set<BlockKey>(listed.begin(), listed.end()), near) << distance << " m";
+    EXPECT_EQ(listed.size(), near.size());
+    EXPECT_TRUE(window.blocks_near(distance, near.size() - 1).empty());
   }
 }
 
