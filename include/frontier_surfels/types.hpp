@@ -113,8 +113,9 @@ struct Report {
   std::size_t created = 0;
   std::size_t removed = 0;
   std::size_t split = 0;      ///< surfels that splitting has added: surfels = those before + split + created - removed
-  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
-  std::size_t device_bytes = 0;   ///< all buffers on the device, the map's included
+  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; pages that are free again included, and on devices with
+                              ///< memory of their own the spare capacity
+  std::size_t device_bytes = 0;   ///< all buffers on the device, the map's included; without what a CPU's system has not given yet
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
   std::vector<StageTime> stages;  ///< in the order of the paper; device time by OpenCL events
@@ -125,8 +126,9 @@ struct Statistics {
   std::size_t surfels = 0;
   std::size_t occupied = 0;
   std::size_t frontier = 0;
-  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; on devices with memory of their own with spare capacity
-  std::size_t device_bytes = 0;  ///< all buffers on the device, the map's included
+  std::size_t map_bytes = 0;  ///< of all that holds surfels or says where they are; pages that are free again included, and on devices with
+                              ///< memory of their own the spare capacity
+  std::size_t device_bytes = 0;  ///< all buffers on the device, the map's included; without what a CPU's system has not given yet
 };
 
 }  // namespace frontier_surfels

@@ -60,19 +60,13 @@ Options parse(int argc, char** argv) {
   Options options;
   CLI::App app("Measures what a frame costs: prints tables, and writes JSON.", "bench");
   declare_options(app, options);
-  try {
+  replay::read_arguments(app, [&] {
     app.parse(argc, argv);
     if (!options.config_file.empty()) options.config = load_config(options.config_file);
     std::string problems;
     for (const std::string& problem : options.config.problems()) problems += problem + "\n";
     if (!problems.empty()) throw CLI::ValidationError("", problems);
-  } catch (const CLI::CallForHelp&) {
-    std::cout << app.help();
-    throw;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
-    throw;
-  }
+  });
   constexpr int kQuickFrames = 4;
   if (options.quick && (options.frames == 0 || options.frames > kQuickFrames)) options.frames = kQuickFrames;
   return options;

@@ -12,6 +12,20 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
+/// Runs what reads the command line, and passes on what it throws; who asks for help, or is wrong, is shown the usage before.
+template <typename Read>
+void read_arguments(const CLI::App& app, Read read) {
+  try {
+    read();
+  } catch (const CLI::CallForHelp&) {
+    std::cout << app.help();
+    throw;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
+    throw;
+  }
+}
+
 /// Runs a command; what it throws becomes a sentence and an exit code.
 /// @param if_out_of_memory  what the user can do then
 template <typename Command>

@@ -117,7 +117,7 @@ Options parse(int argc, char** argv) {
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
                "replay_score");
   declare_options(app, options, raw);
-  try {
+  read_arguments(app, [&] {
     app.parse(arguments);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
@@ -133,13 +133,7 @@ Options parse(int argc, char** argv) {
       } catch (const Error& error) {
         throw CLI::ValidationError("", error.what());
       }
-  } catch (const CLI::CallForHelp&) {
-    std::cout << app.help();
-    throw;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
-    throw;
-  }
+  });
   return options;
 }
 
