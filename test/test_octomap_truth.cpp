@@ -85,7 +85,7 @@ void look(OctomapTruth& truth, SlowMap& slow, const Voxel& from, int axis, int s
   } else {
     frame.T_world_camera.linear() << unit(2), unit(1), -unit(0);
   }
-  EXPECT_GT(truth.add(frame), 0);
+  EXPECT_GT(truth.add(frame).wall_ms, 0);
 
   Voxel v = from;
   for (; v[axis] != from[axis] + steps; v[axis] += steps < 0 ? -1 : 1) slow.miss(v);

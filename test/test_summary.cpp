@@ -35,7 +35,7 @@ FrameRecord frame(int i) {
   record.report.stages = {{"sweeps", (i + 1) / 4.0}};
   if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
   record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
-  record.octomap_ms = 100.0 * (i + 1);
+  record.octomap = scoring::InsertionTime{100.0 * (i + 1), 90.0 * (i + 1)};
   return record;
 }
 
@@ -194,7 +194,7 @@ TEST(FramesCsv, NumbersReadBackExactly) {
                                           report.stages[0].ms,
                                           median,
                                           report.total_ms,
-                                          *record.octomap_ms};
+                                          record.octomap->wall_ms};
     EXPECT_EQ(values, expected) << line;
   }
   EXPECT_FALSE(std::getline(csv, line));
@@ -202,7 +202,7 @@ TEST(FramesCsv, NumbersReadBackExactly) {
 
 TEST(FramesCsv, HasNoOctomapColumnWithoutOctomap) {
   std::vector<FrameRecord> records = frames(1);
-  records[0].octomap_ms.reset();
+  records[0].octomap.reset();
   EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total\n1305031102.160407,1000,1200,200,0.25,1.0\n");
 }
 

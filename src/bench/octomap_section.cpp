@@ -1,14 +1,9 @@
 /// OctoMap's insertion beside the mapper, frame by frame, so that whatever disturbs the machine disturbs both.
-#include <octomap/octomap.h>
-
-#include <chrono>
-
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
 #include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
-#include "scoring/octomap_cloud.hpp"
 
 namespace frontier_surfels::bench {
 namespace {
@@ -18,24 +13,10 @@ using nlohmann::ordered_json;
 constexpr double kResolution = 0.01;       // [m]
 constexpr double kQuickResolution = 0.05;  // [m]
 
-struct Times {
-  std::vector<double> wall_ms, cpu_ms;
-};
-
-void insert(octomap::OcTree& tree, const DepthFrame& frame, const Config& config, Times& times) {
-  // The pixels of the mapper's working image.
-  const octomap::Pointcloud cloud = scoring::to_octomap_cloud(frame, {config.z_min, config.z_max, config.decimation});
-
-  const auto start = std::chrono::steady_clock::now();
-  const double cpu_before_ms = replay::process_cpu_ms();
-  tree.insertPointCloud(cloud, scoring::octomap_origin(frame), config.z_max);
-  times.cpu_ms.push_back(replay::process_cpu_ms() - cpu_before_ms);
-  times.wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-}
-
-/// Of the same frames that the mapper's figures are taken over.
-ordered_json warm_statistics(const std::vector<double>& values, std::size_t warm) {
-  return statistics_json({values.end() - static_cast<std::ptrdiff_t>(warm), values.end()});
+ordered_json octomap_statistics(const std::vector<replay::FrameRecord>& frames, double scoring::InsertionTime::*time) {
+  std::vector<double> values;
+  for (const replay::FrameRecord& frame : frames) values.push_back(frame.octomap.value().*time);
+  return statistics_json(values);
 }
 
 ordered_json measure_row(const Options& options, const Input& input) {
@@ -47,14 +28,14 @@ ordered_json measure_row(const Options& options, const Input& input) {
     // lacks the frames between is not compared with a map that has them, and both see as much new space in a frame.
     const auto source = input.open(options.octomap_frames);
     Mapper mapper(config);
-    octomap::OcTree tree(resolution);
-    Times times;
-    const auto run =
-        run_frames(mapper, *source, options, [&](const DepthFrame& frame, replay::FrameRecord&) { insert(tree, frame, config, times); });
+    scoring::OctomapTruth octomap(resolution, config.z_min, config.z_max, config.decimation);
+    const auto run = run_frames(mapper, *source, options,
+                                [&](const DepthFrame& frame, replay::FrameRecord& record) { record.octomap = octomap.add(frame); });
     add_figures(run, row);
-    const std::size_t warm = replay::warm_frames(run.frames).size();
-    row["octomap"] = {
-        {"time_ms", warm_statistics(times.wall_ms, warm)}, {"cpu_ms", warm_statistics(times.cpu_ms, warm)}, {"bytes", tree.memoryUsage()}};
+    const auto warm = replay::warm_frames(run.frames);
+    row["octomap"] = {{"time_ms", octomap_statistics(warm, &scoring::InsertionTime::wall_ms)},
+                      {"cpu_ms", octomap_statistics(warm, &scoring::InsertionTime::cpu_ms)},
+                      {"memory_mb", octomap.memory_mb()}};
     const auto ratio = [&row](const char* time) { return double(row["octomap"][time]["median"]) / double(row[time]["median"]); };
     row["ratio_time"] = ratio("time_ms");
     row["ratio_cpu"] = ratio("cpu_ms");

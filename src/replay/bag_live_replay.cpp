@@ -70,7 +70,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
     return;
   }
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
-  if (yardsticks != nullptr) record.octomap_ms = yardsticks->add(frame.view());
+  if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view());
   run.frames.push_back(std::move(record));
 }
 

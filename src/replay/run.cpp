@@ -18,7 +18,7 @@ Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exa
   if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config.z_min, config.z_max, config.decimation);
 }
 
-std::optional<double> Yardsticks::add(const DepthFrame& frame) {
+std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
   if (exact_) exact_->add(frame);
   if (!octomap_) return std::nullopt;
   return octomap_->add(frame);
@@ -65,7 +65,7 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
   const auto source = open_source(recording.path, recording.options);
   Mapper mapper(config);
   const auto measure = [yardsticks](const DepthFrame& view, FrameRecord& record) {
-    if (yardsticks != nullptr) record.octomap_ms = yardsticks->add(view);
+    if (yardsticks != nullptr) record.octomap = yardsticks->add(view);
   };
   Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty()) throw nothing_usable(recording, run.skipped);

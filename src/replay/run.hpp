@@ -27,8 +27,8 @@ class Yardsticks {
   /// @param octomap_resolution  [m]; 0: no OctoMap
   Yardsticks(const Config& config, double octomap_resolution, bool exact);
 
-  /// @return OctoMap's wall time for the frame [ms], where there is one
-  std::optional<double> add(const DepthFrame& frame);
+  /// @return what the frame took OctoMap, where there is one
+  std::optional<scoring::InsertionTime> add(const DepthFrame& frame);
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
   const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }
@@ -49,7 +49,7 @@ class Yardsticks {
 struct FrameRecord {
   Report report;
   Eigen::Isometry3d T_world_camera;
-  std::optional<double> octomap_ms;
+  std::optional<scoring::InsertionTime> octomap;
   double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
 };
 

@@ -46,7 +46,7 @@ double stage_ms(const FrameRecord& frame, const std::string& name) {
 
 double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
 
-double octomap_ms(const FrameRecord& frame) { return frame.octomap_ms.value_or(0); }
+double octomap_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->wall_ms : 0; }
 
 std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
   char text[200];
@@ -137,7 +137,7 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
 
 std::string frames_csv(const std::vector<FrameRecord>& frames) {
   const std::vector<std::string> stages = stage_names(frames);
-  const bool octomap = !frames.empty() && frames.front().octomap_ms.has_value();
+  const bool octomap = !frames.empty() && frames.front().octomap.has_value();
   std::string csv = "stamp,surfels,created,removed,";
   for (const std::string& name : stages) csv += name + ",";
   csv += octomap ? "total,octomap_ms\n" : "total\n";

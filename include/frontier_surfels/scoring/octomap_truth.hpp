@@ -17,14 +17,20 @@ struct OctomapScore {
   double for_ = 0;          ///< fn / |M|
 };
 
+/// What an insertion took [ms].
+struct InsertionTime {
+  double wall_ms = 0;
+  double cpu_ms = 0;
+};
+
 class OctomapTruth {
  public:
   /// @param resolution  side of a voxel [m];  z_min, z_max: depths outside are no measurements;  decimation: as by the mapper
   OctomapTruth(double resolution, double z_min, double z_max, int decimation);
   ~OctomapTruth();
 
-  /// Inserts a frame's points with insertPointCloud. @return its wall time [ms], without the making of the point cloud
-  double add(const DepthFrame& frame);
+  /// Inserts a frame's points with insertPointCloud. @return what that took, without the making of the point cloud
+  InsertionTime add(const DepthFrame& frame);
 
   /// M: unknown voxels that are 6-neighbours of known (free or occupied) ones - eq. (17)-(18): one surfel at the centre of each. Normal:
   /// the normalised sum of unit vectors to the known voxels among the 26 neighbours; radius sqrt(3)/2 resolution; label occupied when a
