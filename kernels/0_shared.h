@@ -27,6 +27,13 @@ namespace frontier_surfels {
 // Side of the blocks of a view's image whose largest depth is known [pixel].
 #define VIEW_BLOCK 8
 
+// So many layers of the cuboid are looked at together when space is observed.
+#define LAYER_RUN 8
+
+// Images of views are kept in squares of VIEW_SQUARE x VIEW_SQUARE pixels, row by row, and so are the pixels of a square: one is 64 bytes.
+// Points near each other are asked for together, and a row of pixels would be of use for one of them.
+#define VIEW_SQUARE 4
+
 // So many candidates, or views, one work item handles at once, as vectors of 16; and the numbers that a view then has.
 #define LANES 16
 #define VIEW_LANE_FIELDS 18
@@ -91,10 +98,9 @@ typedef struct {
   float block_size;                         // edge of a block, a power of two [m]
 } Window;
 
-// A kept view: where it was and where its depths, and the largest depths of its blocks, start in their pools.
+// A kept view: what its camera sees of this frame's, and where its depths, and the largest depths of its blocks, start in their pools.
 typedef struct {
-  Transform T_camera_world;
-  float fx, fy, cx, cy;
+  Transform to_image;  // this frame's camera -> (x, y, z): in the view's camera at depth z, in column x / z and row y / z, rounded down
   SHARED_INT width, height;
   SHARED_UINT first_pixel;
   SHARED_UINT first_block;
@@ -102,26 +108,26 @@ typedef struct {
 
 // A surfel as the view's grid sees it.
 typedef struct {
-  float i, j, k;           // grid coordinates of the centre
-  float reach;             // rho = 2 r / delta(z) [voxel]
-  float n_x, n_y, n_z;     // normal, camera frame
-  float n_k;               // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
-  float ray_x, ray_y;      // a step along k moves so many voxels in x and y
-  SHARED_UINT slot;        // in the map
-  SHARED_UINT ragged;      // 1: opens no path to known space, only closes it
+  float i, j, k;        // grid coordinates of the centre
+  float reach;          // rho = 2 r / delta(z) [voxel]
+  float n_x, n_y, n_z;  // normal, camera frame
+  float n_k;            // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
+  float ray_x, ray_y;   // a step along k moves so many voxels in x and y
+  SHARED_UINT slot;     // in the map
+  SHARED_UINT ragged;   // 1: opens no path to known space, only closes it
 } ViewSurfel;
 
 // Limits of the method, from the configuration.
 typedef struct {
   float th_d;
-  float peak;               // in steps of 1 / SIGN_FIELD_ONE
-  float thickness;          // [voxel]
+  float peak;       // in steps of 1 / SIGN_FIELD_ONE
+  float thickness;  // [voxel]
   float hull_unknown_scale;
-  float split_radius;       // surfels of this radius or more are split [voxel]
-  float create_radius;      // of a new surfel [voxel]
-  float normal_min;         // shorter sums of directions make no surfel
-  float min_gap;            // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
-  float surface_depth;      // so far behind a measured surface a surfel is occupied [m]
+  float split_radius;   // surfels of this radius or more are split [voxel]
+  float create_radius;  // of a new surfel [voxel]
+  float normal_min;     // shorter sums of directions make no surfel
+  float min_gap;        // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
+  float surface_depth;  // so far behind a measured surface a surfel is occupied [m]
   SHARED_INT median_votes;
 } Limits;
 
@@ -129,7 +135,7 @@ typedef struct {
 static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
 static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
 static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
-static_assert(sizeof(View) == 20 * 4, "View must have no padding");
+static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 10 * 4, "Limits must have no padding");
 }  // namespace frontier_surfels

@@ -20,14 +20,8 @@ __kernel void list_kept(__global const uint* offsets, const int count, __global 
   if (n < count && offsets[n + 1] > offsets[n]) created[offsets[n]] = n;
 }
 
-INLINE float16 voxel_sizes(const Grid* g, float16 z) { return fmax(z, g->z_min) / g->f; }
-
 // So far before a surfel, 7/4 of its radius, known space is expected.
 INLINE float16 front_distances(const Grid* g, float16 z) { return 1.75f * 0.8660254f * voxel_sizes(g, z); }
-
-INLINE int16 knows_points(const View* view, __global const float* depths, Points p, int16 asked) {
-  return knows(view, depths, p.x, p.y, p.z, asked);
-}
 
 // Normals of new surfels: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
 // observed voxel nearest to it that does not, and the surfel is ragged.
@@ -35,7 +29,7 @@ INLINE int16 knows_points(const View* view, __global const float* depths, Points
 Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
                       Points center, Points mean, int16 around, int16 asked, int16* ragged) {
   const float16 reach = front_distances(g, center.z);
-  *ragged = asked & ~knows_points(view, depths, add_scaled(center, reach, mean), asked);
+  *ragged = asked & ~knows(view, depths, add_scaled(center, reach, mean), asked);
   if (lane_bits(*ragged) == 0) return mean;
   Points best = mean;
   float16 best_cosine = -1.0f;
@@ -46,27 +40,13 @@ Points surfel_normals(const Grid* g, const View* view, __global const float* dep
     const Points direction = normalized((Points){u.x - center.x, u.y - center.y, u.z - center.z});
     const float16 cosine = direction.x * mean.x + direction.y * mean.y + direction.z * mean.z;
     better &= cosine > best_cosine;
-    better = knows_points(view, depths, add_scaled(center, reach, direction), better);
+    better = knows(view, depths, add_scaled(center, reach, direction), better);
     best.x = better ? direction.x : best.x;
     best.y = better ? direction.y : best.y;
     best.z = better ? direction.z : best.z;
     best_cosine = better ? cosine : best_cosine;
   }
   return best;
-}
-
-INLINE int16 floor_ints(float16 x) {
-  const int16 above = convert_int16(x);
-  return above + (convert_float16(above) > x);
-}
-
-// Are points of the camera's frame in these voxels?
-INLINE int16 in_voxels(const Grid* g, Points p, Voxels v) {
-  const int16 cuboid = p.z < g->z_min;
-  const float16 width = cuboid ? g->z_min : p.z;
-  const float16 k = cuboid ? p.z / g->delta_min + (float)g->padding_k : g->f * natural_log16(p.z / g->z_min) + g->k_min;
-  return (floor_ints(p.x * g->fx / width + g->center_i + 0.5f) == v.i) & (floor_ints(p.y * g->fy / width + g->center_j + 0.5f) == v.j) &
-         (floor_ints(k + 0.5f) == v.k);
 }
 
 // Where in their voxels surfels stand: slid along their normals until they are near the boundary, in steps of a tenth of a voxel. A step
@@ -76,14 +56,14 @@ Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* aro
   const float16 step = 0.1f * voxel_sizes(g, center.z), front = front_distances(g, center.z);
   const Points forward = {step * normal.x, step * normal.y, step * normal.z};
   const Points ahead = {front * normal.x, front * normal.y, front * normal.z};
-  const int16 has_front = knows_points(view, depths, add_scaled(center, 1.0f, ahead), asked);
+  const int16 has_front = knows(view, depths, add_scaled(center, 1.0f, ahead), asked);
   int16 moving = asked, steps = 0;
   for (int n = 1; n <= 4 && lane_bits(moving) != 0; ++n) {
     const Points next = add_scaled(center, (float)n, forward);
-    moving &= in_voxels(g, next, v);
-    moving &= ~knows_points(view, depths, next, moving);
-    moving &= ~knows_points(view, depths, add_scaled(next, 1.0f, forward), moving);
-    moving &= ~has_front | knows_points(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
+    moving &= same_voxels(voxels_at(g, next), v);
+    moving &= ~knows(view, depths, next, moving);
+    moving &= ~knows(view, depths, add_scaled(next, 1.0f, forward), moving);
+    moving &= ~has_front | knows(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
     steps -= moving;
   }
   int16 open = asked & (steps > 0);

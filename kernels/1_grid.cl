@@ -19,9 +19,9 @@ INLINE int floor_int(float x) {
   return above - ((float)above > x ? 1 : 0);
 }
 
-INLINE int8 floor_int8(float8 x) {
-  const int8 above = convert_int8(x);
-  return above + (convert_float8(above) > x);
+INLINE int16 floor_int16(float16 x) {
+  const int16 above = convert_int16(x);
+  return above + (convert_float16(above) > x);
 }
 
 // ln x for normal x > 0, within 2e-7; unlike log() the same on every device. x = 2^e m, m around 1: ln m = 2 artanh((m - 1) / (m + 1)).
@@ -32,7 +32,6 @@ INLINE int8 floor_int8(float8 x) {
     return exponent * 0.69314718f + s * (2.0f + q * (0.66666667f + q * (0.4f + q * (0.28571429f + q * 0.22222222f)))); \
   }
 DEFINE_NATURAL_LOG(natural_log, float, as_int, as_float, (float))
-DEFINE_NATURAL_LOG(natural_log8, float8, as_int8, as_float8, convert_float8)
 DEFINE_NATURAL_LOG(natural_log16, float16, as_int16, as_float16, convert_float16)
 
 // F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.

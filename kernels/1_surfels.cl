@@ -6,7 +6,7 @@
 //   alive[pages]: which slots hold a surfel;   page_block[pages]: x, y, z of the block, w: the frame that changed the page last
 //   changed[pages]: which slots this frame has changed, for pages of this frame's window
 //
-// Where a stage goes through all surfels of a page, one work item does eight, as vectors.
+// Where a stage goes through all surfels of a page, one work item does LANES of them.
 
 // A positive float as 16 bits (IEEE half precision), rounded to nearest. Too small or large ones become the nearest that there is.
 INLINE uint float_to_half(float x) { return (as_uint(clamp(x, 6.2e-5f, 65000.0f)) + 0x1000u - (112u << 23)) >> 13; }
@@ -55,68 +55,54 @@ INLINE bool is_alive(__global const ulong* alive, uint slot) { return ((alive[sl
 INLINE void set_slot(__global uint* halves, uint slot) { atomic_or(&halves[slot / 32], 1u << (slot % 32)); }
 INLINE void clear_slot(__global uint* halves, uint slot) { atomic_and(&halves[slot / 32], ~(1u << (slot % 32))); }
 
-// Eight surfels of a page, camera frame.
+// LANES surfels of a page, camera frame.
 typedef struct {
-  float8 x, y, z, radius;
-  uint8 normal, attributes;  // as the map keeps them
-} Surfels8;
+  Points position;
+  float16 radius;
+  uint16 normal, attributes;  // as the map keeps them
+} Surfels;
 
-// p_b of eight points.
-INLINE void transform_eight(const Transform* T, float8* x, float8* y, float8* z) {
-  const float8 a = *x, b = *y, c = *z;
-  *x = T->r00 * a + T->r01 * b + T->r02 * c + T->t0;
-  *y = T->r10 * a + T->r11 * b + T->r12 * c + T->t1;
-  *z = T->r20 * a + T->r21 * b + T->r22 * c + T->t2;
-}
-
-//   first: slot of the first of them, a multiple of 8
-INLINE Surfels8 load_eight(const Window* window, const Transform* T_camera_local, __global const uint4* surfels, int4 block, uint first) {
+//   first: slot of the first of them, a multiple of LANES
+INLINE Surfels load_surfels(const Window* window, const Transform* T_camera_local, __global const uint4* surfels, int4 block, uint first) {
   __global const uint* words = (__global const uint*)(surfels + first);
-  const uint16 low = vload16(0, words), high = vload16(1, words);
-  const uint8 x = (uint8)(low.s048c, high.s048c), y = (uint8)(low.s159d, high.s159d);
-  Surfels8 s;
-  s.x = ((float)(block.x - window->origin_x) + (convert_float8(x & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
-  s.y = ((float)(block.y - window->origin_y) + (convert_float8(x >> 16) + 0.5f) / 65536.0f) * window->block_size;
-  s.z = ((float)(block.z - window->origin_z) + (convert_float8(y & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
-  transform_eight(T_camera_local, &s.x, &s.y, &s.z);
-  s.radius = as_float8(((y >> 16) << 13) + (112u << 23));
-  s.normal = (uint8)(low.s26ae, high.s26ae);
-  s.attributes = (uint8)(low.s37bf, high.s37bf);
+  const uint16 a = vload16(0, words), b = vload16(1, words), c = vload16(2, words), d = vload16(3, words);
+  const uint16 x = (uint16)(a.s048c, b.s048c, c.s048c, d.s048c), y = (uint16)(a.s159d, b.s159d, c.s159d, d.s159d);
+  Surfels s;
+  s.position.x = ((float)(block.x - window->origin_x) + (convert_float16(x & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
+  s.position.y = ((float)(block.y - window->origin_y) + (convert_float16(x >> 16) + 0.5f) / 65536.0f) * window->block_size;
+  s.position.z = ((float)(block.z - window->origin_z) + (convert_float16(y & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
+  s.position = transform_points(T_camera_local, s.position);
+  s.radius = as_float16(((y >> 16) << 13) + (112u << 23));
+  s.normal = (uint16)(a.s26ae, b.s26ae, c.s26ae, d.s26ae);
+  s.attributes = (uint16)(a.s37bf, b.s37bf, c.s37bf, d.s37bf);
   return s;
 }
 
 // Their normals, camera frame.
-INLINE void normals_of_eight(const Surfels8* s, const Transform* T_camera_local, float8* x, float8* y, float8* z) {
-  float8 n_x = convert_float8(as_int8(s->normal << 16) >> 16), n_y = convert_float8(as_int8(s->normal) >> 16);
-  const float8 n_z = 32767.0f - fabs(n_x) - fabs(n_y), fold = fmax(-n_z, 0.0f);
-  n_x += select(-fold, fold, n_x < 0.0f);
-  n_y += select(-fold, fold, n_y < 0.0f);
-  const float8 length = sqrt(n_x * n_x + n_y * n_y + n_z * n_z);
-  *x = (T_camera_local->r00 * n_x + T_camera_local->r01 * n_y + T_camera_local->r02 * n_z) / length;
-  *y = (T_camera_local->r10 * n_x + T_camera_local->r11 * n_y + T_camera_local->r12 * n_z) / length;
-  *z = (T_camera_local->r20 * n_x + T_camera_local->r21 * n_y + T_camera_local->r22 * n_z) / length;
+INLINE Points surfel_normals16(const Surfels* s, const Transform* T_camera_local) {
+  Points n = {convert_float16(as_int16(s->normal << 16) >> 16), convert_float16(as_int16(s->normal) >> 16), 0.0f};
+  n.z = 32767.0f - fabs(n.x) - fabs(n.y);
+  const float16 fold = fmax(-n.z, 0.0f);
+  n.x += n.x < 0.0f ? fold : -fold;
+  n.y += n.y < 0.0f ? fold : -fold;
+  const float16 length = lengths(n);
+  const Transform* T = T_camera_local;
+  return (Points){(T->r00 * n.x + T->r01 * n.y + T->r02 * n.z) / length, (T->r10 * n.x + T->r11 * n.y + T->r12 * n.z) / length,
+                  (T->r20 * n.x + T->r21 * n.y + T->r22 * n.z) / length};
 }
 
-// The voxels that eight points (camera frame) lie in. @return -1 (all bits) where that is inside the grid
-INLINE int8 voxels_of_eight(const Grid* g, float8 x, float8 y, float8 z, int8* i, int8* j, int8* k) {
-  const float8 depth = fmax(z, g->z_min);
-  const float8 layer = select(z / g->delta_min + (float)g->padding_k, g->f * natural_log8(depth / g->z_min) + g->k_min, z >= g->z_min);
-  *i = floor_int8(x * g->fx / depth + g->center_i + 0.5f);
-  *j = floor_int8(y * g->fy / depth + g->center_j + 0.5f);
-  *k = floor_int8(layer + 0.5f);
-  return *i >= 0 && *j >= 0 && *k >= 0 && *i < g->size_i && *j < g->size_j && *k < g->size_k;
+// Those that a measured surface would still tell something: that they are occupied, or their colour.
+INLINE int16 lacks_label(uint16 attributes, int has_color) {
+  const uint done = SURFEL_OCCUPIED | (has_color ? SURFEL_COLORED : 0);
+  return (attributes & done) != done;
 }
 
-// Bits of the lanes that are -1.
-INLINE uint lanes_of(int8 mask) {
-  const int8 bits = mask & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-  const int4 four = bits.lo | bits.hi;
-  return (uint)(four.x | four.y | four.z | four.w);
-}
+// Bits of LANES slots in a word of their page.
+INLINE uint lanes_of_page(ulong word, uint first) { return (uint)(word >> (first % PAGE_SLOTS)) & ((1u << LANES) - 1); }
 
-// The word whose bytes are lanes[0 ... 7].
-INLINE ulong pack_lanes(__local const uchar* lanes) {
+// The word whose parts are lanes[0 ... 3].
+INLINE ulong pack_lanes(__local const ushort* lanes) {
   ulong bits = 0;
-  for (int n = 0; n < 8; ++n) bits |= (ulong)lanes[n] << (8 * n);
+  for (int n = 0; n < PAGE_SLOTS / LANES; ++n) bits |= (ulong)lanes[n] << (LANES * n);
   return bits;
 }

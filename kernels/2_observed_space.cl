@@ -21,14 +21,26 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
   column_end[pixel] = d > 0.0f ? low : 0;
 }
 
+// Valid pixels of a rectangle. columns, rows: first and one past the last
+//   valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
+INLINE int valid_pixels(const Grid* g, __global const int* valid_above, ushort2 columns, ushort2 rows) {
+  __global const int* top = valid_above + rows.x * (g->width + 1);
+  __global const int* bottom = valid_above + rows.y * (g->width + 1);
+  return bottom[columns.y] - bottom[columns.x] - top[columns.y] + top[columns.x];
+}
+
 // One work item a word, dimensions i, w and j: pyramid bits are a run up to the column's end; a cuboid voxel is observed iff a valid
-// pixel's ray has its sample of that layer in it, that is, iff there is one in a fixed rectangle of the image.
-//   in  column_end[height][width];  valid_above[height + 1][width + 1]: valid pixels above and to the left (a summed area table)
-//       pixels_i[first_pyramid_layer][size_i], pixels_j[first_pyramid_layer][size_j]: first and one past the last pixel whose sample lies
-//       there
+// pixel's ray has its sample of that layer in it, that is, iff there is one in a fixed rectangle of the image. Of most runs of layers all
+// pixels are valid, or none.
+//   in  column_end[height][width];  valid_above: of valid_pixels
+//       pixels_i[layers][size_i], pixels_j[layers][size_j]: first and one past the last pixel whose sample lies there, of the cuboid's
+//       layers, filled up to whole words;  run_pixels_i[layers / LAYER_RUN][size_i], run_pixels_j: the same, of runs of layers;
+//       layers_i[layers / 64][size_i], layers_j: bits of the layers that have such pixels at all
 //   out observed: bit field
 __kernel void observed_space(const Grid g, __global const int* column_end, __global const int* valid_above,
-                             __global const ushort2* pixels_i, __global const ushort2* pixels_j, __global ulong* observed) {
+                             __global const ushort2* pixels_i, __global const ushort2* pixels_j, __global const ushort2* run_pixels_i,
+                             __global const ushort2* run_pixels_j, __global const ulong* layers_i, __global const ulong* layers_j,
+                             __global ulong* observed) {
   const int i = get_global_id(0), w = get_global_id(1), j = get_global_id(2);
   if (i >= g.size_i) return;
 
@@ -38,35 +50,51 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
     bits = bit_run(g.first_pyramid_layer - 64 * w, column_end[t * g.width + s] - 64 * w);
   }
 
-  const int stride = g.width + 1;
-  const int cuboid_end = min(64 * (w + 1), g.first_pyramid_layer);
-  for (int k = max(64 * w, g.padding_k); k < cuboid_end; ++k) {
-    const ushort2 column = pixels_i[k * g.size_i + i], row = pixels_j[k * g.size_j + j];
-    if (column.x >= column.y || row.x >= row.y) continue;
-    __global const int* top = valid_above + row.x * stride;
-    __global const int* bottom = valid_above + row.y * stride;
-    if (bottom[column.y] - bottom[column.x] - top[column.y] + top[column.x] > 0) bits |= 1ul << (k - 64 * w);
+  ulong cuboid = 64 * w < g.first_pyramid_layer ? layers_i[w * g.size_i + i] & layers_j[w * g.size_j + j] : 0;
+  for (ulong left = cuboid; left != 0;) {
+    const int k = 64 * w + lowest_bit(left), run = k / LAYER_RUN;
+    const ulong run_layers = bit_run(LAYER_RUN * run - 64 * w, LAYER_RUN * (run + 1) - 64 * w);
+    const ushort2 columns = run_pixels_i[run * g.size_i + i], rows = run_pixels_j[run * g.size_j + j];
+    const int valid = valid_pixels(&g, valid_above, columns, rows);
+    if (valid == 0) cuboid &= ~run_layers;
+    const bool mixed = valid > 0 && valid < (columns.y - columns.x) * (rows.y - rows.x);
+    for (ulong layers = mixed ? left & run_layers : 0; layers != 0; layers &= layers - 1) {
+      const int bit = lowest_bit(layers), layer = 64 * w + bit;
+      if (valid_pixels(&g, valid_above, pixels_i[layer * g.size_i + i], pixels_j[layer * g.size_j + j]) == 0) cuboid &= ~(1ul << bit);
+    }
+    left &= ~run_layers;
   }
+  bits |= cuboid;
   observed[word_index(&g, i, j, w)] = bits & valid_layers(&g, w);
 }
 
-// Exact membership of eight points in the space that one view has seen (its pixel there is valid and lies deeper).
-//   depths: all views' images;  x, y, z: in the view's camera frame [m]
-// @return -1 (all bits) where the view knows the point
-INLINE int8 view_knows_eight(const View* view, __global const float* depths, float8 x, float8 y, float8 z) {
-  const float8 s = x * view->fx / z + view->cx + 0.5f, t = y * view->fy / z + view->cy + 0.5f;
-  const int8 seen = z > 0.0f && s >= 0.0f && t >= 0.0f && s < (float)view->width && t < (float)view->height;
-  const int8 pixel = select((int8)(0), convert_int8(t) * view->width + convert_int8(s), seen);
-  __global const float* depth = depths + view->first_pixel;
-  const float8 d = (float8)(depth[pixel.s0], depth[pixel.s1], depth[pixel.s2], depth[pixel.s3], depth[pixel.s4], depth[pixel.s5],
-                            depth[pixel.s6], depth[pixel.s7]);
-  return seen && z < fabs(d);
+// Where pixels of a view's image are (0_shared.h).
+INLINE uint16 view_pixels(const View* view, uint16 column, uint16 row) {
+  const uint columns = ((uint)view->width + VIEW_SQUARE - 1) / VIEW_SQUARE;
+  const uint16 square = row / VIEW_SQUARE * columns + column / VIEW_SQUARE;
+  return (square * VIEW_SQUARE + row % VIEW_SQUARE) * VIEW_SQUARE + column % VIEW_SQUARE;
 }
 
-// Is layer k of a pixel's column, or a point there at depth z, at the measured surface that ended the column, or at most `surface_depth`
-// behind it?
-//   depth, column_end: of the pixel
-INLINE bool at_surface(const Grid* g, float depth, int column_end, float surface_depth, int k, float z) {
-  if ((float)k <= g->k_min || depth <= 0.0f) return false;
-  return (k == column_end && k > g->first_pyramid_layer) || (z >= depth && z <= depth + surface_depth);
+// Exact membership of points in the space that one view has seen (its pixel there is valid and lies deeper), of those that are asked.
+//   depths: all views' images, without signs;  p: in this frame's camera [m]
+INLINE int16 knows(const View* view, __global const float* depths, Points p, int16 asked) {
+  const Points q = transform_points(&view->to_image, p);
+  const float16 scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
+  const int16 seen = asked & (q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
+  if (lane_bits(seen) == 0) return 0;
+  const uint16 pixel = view_pixels(view, convert_uint16(s), convert_uint16(t));
+  return seen & (q.z < gather(depths + view->first_pixel, seen ? as_int16(pixel) : 0));
+}
+
+// Are points in these voxels, at depths z, at the measured surface that ended their pixel's column, or at most `surface_depth` behind it?
+//   depth, column_end: of all pixels;   out pixel: theirs, 0 beside the image
+INLINE int16 at_surface(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, Voxels v,
+                        float16 z, int16 asked, int16* pixel) {
+  const int16 s = v.i - g->padding_i, t = v.j - g->padding_j;
+  const int16 in_image = asked & (s >= 0) & (t >= 0) & (s < g->width) & (t < g->height) & (convert_float16(v.k) > g->k_min);
+  *pixel = in_image ? t * g->width + s : 0;
+  if (lane_bits(in_image) == 0) return 0;
+  const float16 d = gather(depth, *pixel);
+  const int16 ends = (v.k == gather_int(column_end, *pixel)) & (v.k > g->first_pyramid_layer);
+  return in_image & (d > 0.0f) & (ends | ((z >= d) & (z <= d + surface_depth)));
 }

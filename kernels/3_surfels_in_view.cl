@@ -41,28 +41,28 @@ INLINE float3 ellipsoid_extents(const ViewSurfel* s, float thickness) {
                   ellipsoid_extent(s, thickness, (float3)(0.0f, 0.0f, 1.0f)));
 }
 
-// One work item eight surfels, one group a page of the window: which of them have an ellipsoid that may reach into the grid, generously,
+// One work item LANES surfels, one group a page of the window: which of them have an ellipsoid that may reach into the grid, generously,
 // and which must be split.
 //   in  pages[count]: those of the window;   out in_view[count], large[count]
-__kernel __attribute__((reqd_work_group_size(8, 1, 1))) void mark_in_view(const Grid g, const Limits limits, const Window window,
-                                                                          const Transform T_camera_local, __global const uint* pages,
-                                                                          __global const ulong* alive, __global const int4* page_block,
-                                                                          __global const uint4* surfels, __global ulong* in_view,
-                                                                          __global ulong* large) {
-  __local uchar in_view_lanes[8], large_lanes[8];
-  const uint page = pages[get_group_id(0)], item = get_local_id(0);
+__kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_in_view(
+    const Grid g, const Limits limits, const Window window, const Transform T_camera_local, __global const uint* pages,
+    __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels, __global ulong* in_view,
+    __global ulong* large) {
+  __local ushort in_view_lanes[PAGE_SLOTS / LANES], large_lanes[PAGE_SLOTS / LANES];
+  const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
   in_view_lanes[item] = large_lanes[item] = 0;
-  if (((alive[page] >> (8 * item)) & 0xff) != 0) {
-    const Surfels8 s = load_eight(&window, &T_camera_local, surfels, page_block[page], PAGE_SLOTS * page + 8 * item);
-    const float8 depth = fmax(s.z, g.z_min), voxel = depth / g.f, slope = 1.0f / depth;
-    const float8 reach = fmax(2.0f * s.radius / voxel, limits.thickness) + 1.5f;
-    const float8 i = s.x * slope * g.fx + g.center_i, j = s.y * slope * g.fy + g.center_j;
-    const float8 reach_i = reach * (1.0f + fabs(s.x * slope)), reach_j = reach * (1.0f + fabs(s.y * slope));
-    const int8 near = s.z >= -((float)g.padding_k + reach) * voxel && s.z <= g.z_max + 2.0f * reach * voxel && i > -reach_i &&
-                      i < (float)g.size_i + reach_i && j > -reach_j && j < (float)g.size_j + reach_j;
-    in_view_lanes[item] = lanes_of(near);
-    int8 v_i, v_j, v_k;
-    large_lanes[item] = lanes_of(voxels_of_eight(&g, s.x, s.y, s.z, &v_i, &v_j, &v_k) && s.radius / voxel >= limits.split_radius);
+  if (lanes_of_page(alive[page], first) != 0) {
+    const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+    const Points p = s.position;
+    const float16 voxel = voxel_sizes(&g, p.z), slope = 1.0f / fmax(p.z, g.z_min);
+    const float16 reach = fmax(2.0f * s.radius / voxel, limits.thickness) + 1.5f;
+    const float16 i = p.x * slope * g.fx + g.center_i, j = p.y * slope * g.fy + g.center_j;
+    const float16 reach_i = reach * (1.0f + fabs(p.x * slope)), reach_j = reach * (1.0f + fabs(p.y * slope));
+    in_view_lanes[item] =
+        (ushort)lane_bits((p.z >= -((float)g.padding_k + reach) * voxel) & (p.z <= g.z_max + 2.0f * reach * voxel) & (i > -reach_i) &
+                          (i < (float)g.size_i + reach_i) & (j > -reach_j) & (j < (float)g.size_j + reach_j));
+    const int16 large_ones = s.radius / voxel >= limits.split_radius;
+    if (lane_bits(large_ones) != 0) large_lanes[item] = (ushort)lane_bits(large_ones & inside_grid16(&g, voxels_at(&g, p)));
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item > 0) return;

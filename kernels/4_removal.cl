@@ -1,49 +1,58 @@
-// Removal - paper 3.4, eq. (12): surfels in observed space go; the voxels of the others are noted.
+// Removal - paper 3.4, eq. (12): surfels in observed space go; voxels of the others are no candidates for new ones.
 // Ours: so do those whose back this frame has seen, and frontier on a sheet of unknown thinner than min_gap.
 
-// One work item eight surfels, one group a page of the window.
-//   in  in_view: which surfels are;  observed: C~;  view, depths: this frame as its own camera sees it, for the exact test
-//   i/o occupied_voxels: bit field as 32-bit halves, zero before
+// Which surfels go, of those inside the grid.
+INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, __global const float* depths, const Surfels* s,
+                    Points normal, int16 inside) {
+  int16 gone = 0;
+  if (remove_buried) gone |= knows(view, depths, add_scaled(s->position, -0.25f * s->radius, normal), inside);
+  if (limits->min_gap > 0.0f)
+    gone |=
+        knows(view, depths, add_scaled(s->position, -limits->min_gap, normal), inside & ~gone & ((s->attributes & SURFEL_OCCUPIED) == 0));
+  return gone;
+}
+
+// One work item LANES surfels, one group a page of the window.
+//   in  in_view: which surfels are;  observed: C~, as 32-bit halves;  view, depths: this frame as its own camera sees it, for the exact
+//       test;  depth, column_end: of 2_observed_space
+//   i/o candidates: 32-bit halves: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
 //   out removed[count]
-__kernel __attribute__((reqd_work_group_size(8, 1, 1))) void mark_removed(
+__kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_removed(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
-    __global const float* depths, __global const uint* pages, __global const ulong* in_view, __global const int4* page_block,
-    __global const uint4* surfels, __global const ulong* observed, __global uint* occupied_voxels, __global ulong* removed) {
-  __local uchar removed_lanes[8];
-  const uint page = pages[get_group_id(0)], item = get_local_id(0);
-  const uint lanes = (uint)(in_view[get_group_id(0)] >> (8 * item)) & 0xff;
-  uint gone = 0;
+    const int has_color, __global const float* depths, __global const float* depth, __global const int* column_end,
+    __global const uint* pages, __global const ulong* in_view, __global const int4* page_block, __global const uint4* surfels,
+    __global const int* observed, __global uint* candidates, __global ulong* changed, __global ulong* removed) {
+  __local ushort removed_lanes[PAGE_SLOTS / LANES], labelled_lanes[PAGE_SLOTS / LANES];
+  const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
+  removed_lanes[item] = labelled_lanes[item] = 0;
+  const uint lanes = lanes_of_page(in_view[get_group_id(0)], first);
   if (lanes != 0) {
-    const Surfels8 s = load_eight(&window, &T_camera_local, surfels, page_block[page], PAGE_SLOTS * page + 8 * item);
-    float8 n_x, n_y, n_z;
-    normals_of_eight(&s, &T_camera_local, &n_x, &n_y, &n_z);
-    int8 i, j, k;
-    const uint inside = lanes & lanes_of(voxels_of_eight(&g, s.x, s.y, s.z, &i, &j, &k));
-    if (inside != 0 && remove_buried) {
-      const float8 back = 0.25f * s.radius;
-      gone |= lanes_of(view_knows_eight(&view, depths, s.x - back * n_x, s.y - back * n_y, s.z - back * n_z));
-    }
-    if (inside != 0 && limits.min_gap > 0.0f) {
-      const float gap = limits.min_gap;
-      gone |= lanes_of((s.attributes & SURFEL_OCCUPIED) == 0 &&
-                       view_knows_eight(&view, depths, s.x - gap * n_x, s.y - gap * n_y, s.z - gap * n_z));
-    }
-    gone &= inside;
-    int word[8], layer[8];
-    vstore8((j * g.words_k + (k >> 6)) * g.size_i + i, 0, word);
-    vstore8(k, 0, layer);
-    for (uint left = inside & ~gone; left != 0; left &= left - 1) {
-      const int n = lowest_lane(left);
-      if ((observed[word[n]] >> (layer[n] & 63)) & 1) {
-        gone |= 1u << n;
-      } else {
-        atomic_or(&occupied_voxels[2 * word[n] + ((layer[n] >> 5) & 1)], 1u << (layer[n] & 31));
+    const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+    const Voxels v = voxels_at(&g, s.position);
+    const int16 inside = inside_grid16(&g, v) & lane_marks(lanes);
+    if (lane_bits(inside) != 0) {
+      const int16 at = inside ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + ((v.k >> 5) & 1) : 0;
+      const int16 bit = (int16)(1) << (v.k & 31);
+      int16 stay = inside & ((gather_int(observed, at) & bit) == 0);
+      stay &= ~leaves(&limits, &view, remove_buried, depths, &s, surfel_normals16(&s, &T_camera_local), stay);
+      int16 pixel;
+      const int16 unlabelled = stay & lacks_label(s.attributes, has_color);
+      labelled_lanes[item] =
+          (ushort)lane_bits(at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &pixel));
+      removed_lanes[item] = (ushort)lane_bits(inside & ~stay);
+      uint halves[LANES], bits[LANES];
+      vstore16(as_uint16(at), 0, halves);
+      vstore16(as_uint16(bit), 0, bits);
+      for (uint left = lane_bits(stay); left != 0; left &= left - 1) {
+        const int n = lowest_lane(left);
+        if ((candidates[halves[n]] & bits[n]) != 0) atomic_and(&candidates[halves[n]], ~bits[n]);  // few are: an atomic is dear
       }
     }
   }
-  removed_lanes[item] = gone;
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (item == 0) removed[get_group_id(0)] = pack_lanes(removed_lanes);
+  if (item > 0) return;
+  removed[get_group_id(0)] = pack_lanes(removed_lanes);
+  changed[page] |= pack_lanes(labelled_lanes);
 }
 
 // One work item a page of the window: slots of removed surfels become free.

@@ -1,64 +1,6 @@
 // Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones that no surfel has taken.
 // Whether they are known is asked of the recent views first, and of the surfels only where those leave it open.
 
-// Candidates are handled LANES at once, as vectors. Comparisons of vectors give -1 where they hold, 0 elsewhere.
-
-INLINE int16 lane_numbers(void) { return (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
-
-// Bit n is lane n's, -1 or 0.
-INLINE uint lane_bits(int16 marks) {
-  const int16 bits = marks & ((int16)(1) << lane_numbers());
-  const int8 of_8 = bits.lo | bits.hi;
-  const int4 of_4 = of_8.lo | of_8.hi;
-  const int2 of_2 = of_4.lo | of_4.hi;
-  return (uint)(of_2.x | of_2.y);
-}
-
-#define GATHER(values, at)                                                                                                               \
-  values[at.s0], values[at.s1], values[at.s2], values[at.s3], values[at.s4], values[at.s5], values[at.s6], values[at.s7], values[at.s8], \
-      values[at.s9], values[at.sa], values[at.sb], values[at.sc], values[at.sd], values[at.se], values[at.sf]
-
-INLINE float16 gather(__global const float* values, int16 at) { return (float16)(GATHER(values, at)); }
-
-// view_knows_eight of 2_observed_space, of sixteen points, for those lanes that are asked.
-INLINE int16 knows(const View* view, __global const float* depths, float16 x, float16 y, float16 z, int16 asked) {
-  const float16 s = x * view->fx / z + view->cx + 0.5f, t = y * view->fy / z + view->cy + 0.5f;
-  const int16 seen = asked & (z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
-  if (lane_bits(seen) == 0) return 0;
-  const int16 pixel = seen ? convert_int16(t) * view->width + convert_int16(s) : 0;
-  return seen & (z < fabs(gather(depths + view->first_pixel, pixel)));
-}
-
-INLINE int16 gather_int(__global const int* values, int16 at) { return (int16)(GATHER(values, at)); }
-
-typedef struct {
-  float16 x, y, z;
-} Points;
-
-typedef struct {
-  int16 i, j, k;
-} Voxels;
-
-INLINE Points add_scaled(Points p, float16 scale, Points direction) {
-  return (Points){p.x + scale * direction.x, p.y + scale * direction.y, p.z + scale * direction.z};
-}
-
-INLINE float16 lengths(Points p) { return sqrt(p.x * p.x + p.y * p.y + p.z * p.z); }
-
-INLINE Points normalized(Points p) {
-  const float16 scale = 1.0f / lengths(p);
-  return (Points){scale * p.x, scale * p.y, scale * p.z};
-}
-
-// a / b for a >= 0, b > 0; there is no instruction for vectors of whole numbers.
-INLINE int16 quotients(int16 a, int b) {
-  const float inverse = 1.0f / (float)b;
-  int16 q = convert_int16(convert_float16(a) * inverse);
-  q += convert_int16(convert_float16(a - q * b) * inverse);  // what float has lost
-  const int16 rest = a - q * b;
-  return q + (rest < 0) - (rest >= b);
-}
-
 // Voxels by their numbers, 64 word + bit.
 INLINE Voxels voxels_of(const Grid* g, int16 numbers) {
   const int16 words = numbers >> 6, rows = quotients(words, g->size_i);
@@ -138,9 +80,8 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
 }
 
 // One work item a word, dimensions i, w and j.
-//   in  observed: C~;  occupied_voxels: those of surviving surfels;   out candidates
-__kernel void find_candidates(const Grid g, __global const ulong* observed, __global const ulong* occupied_voxels,
-                              __global ulong* candidates) {
+//   in  observed: C~;   out candidates: also those that surviving surfels take; 4_removal knows them
+__kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates) {
   const int i = get_global_id(0), w = get_global_id(1), j = get_global_id(2);
   if (i >= g.size_i) return;
   const int word = word_index(&g, i, j, w);
@@ -152,5 +93,5 @@ __kernel void find_candidates(const Grid g, __global const ulong* observed, __gl
   if (i + 1 < g.size_i) beside |= observed[word + 1];
   if (j > 0) beside |= observed[word_index(&g, i, j - 1, w)];
   if (j + 1 < g.size_j) beside |= observed[word_index(&g, i, j + 1, w)];
-  candidates[word] = beside & ~here & ~occupied_voxels[word] & valid_layers(&g, w);
+  candidates[word] = beside & ~here & valid_layers(&g, w);
 }

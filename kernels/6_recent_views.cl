@@ -89,131 +89,138 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
   return bits;
 }
 
-// Which of LANES candidates of a tile are known to one of some views. Their centres lie on lines a + z b, in the camera's frame and in
-// every view's.
-//   entries: VIEW_TILE_K column + layer;  asked: -1 where there is one;  numbers[count]: of the views
-int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __local const ushort* numbers,
-                   int count, __global const float* depths, int16 entries, int16 asked) {
-  const int16 column = entries / VIEW_TILE_K, k = tile.z * VIEW_TILE_K + entries % VIEW_TILE_K;
-  const float16 c_i = convert_float16(tile.x * VIEW_TILE + column % VIEW_TILE) - g->center_i;
-  const float16 c_j = convert_float16(tile.y * VIEW_TILE + column / VIEW_TILE) - g->center_j;
-  const float16 z = gather(layer_depth, k);
-  const int16 pyramid = k >= g->first_pyramid_layer;
-  const float16 base_x = pyramid ? 0.0f : c_i * g->z_min / g->fx, base_y = pyramid ? 0.0f : c_j * g->z_min / g->fy;
-  const float16 ray_x = pyramid ? c_i / g->fx : 0.0f, ray_y = pyramid ? c_j / g->fy : 0.0f;
-  int16 open = asked;
-  for (int n = 0; n < count && lane_bits(open) != 0; ++n) {
-    const View view = views[numbers[n]];
-    const Transform T = view.T_camera_world;
-    const float16 x = T.r00 * base_x + T.r01 * base_y + T.t0 + z * (T.r00 * ray_x + T.r01 * ray_y + T.r02);
-    const float16 y = T.r10 * base_x + T.r11 * base_y + T.t1 + z * (T.r10 * ray_x + T.r11 * ray_y + T.r12);
-    const float16 q = T.r20 * base_x + T.r21 * base_y + T.t2 + z * (T.r20 * ray_x + T.r21 * ray_y + T.r22);
-    open &= ~knows(&view, depths, x, y, q, open);
-  }
-  return asked & ~open;
-}
-
 #define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
 
-// Number, in units of VIEW_TILE_K bits, of a tile's part of a bit field's column; -1 beyond the grid.
-INLINE int column_bits(const Grid* g, int3 tile, int column) {
-  const int i = tile.x * VIEW_TILE + column % VIEW_TILE, j = tile.y * VIEW_TILE + column / VIEW_TILE;
-  return i < g->size_i && j < g->size_j ? 4 * word_index(g, i, j, tile.z / 4) + tile.z % 4 : -1;
-}
-
-// What a work-group knows of its tile.
+// What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
-  uint open[TILE_COLUMNS];                                                    // layers with a candidate
-  uint layers;                                                                // those of all columns
-  ushort entries[TILE_COLUMNS * VIEW_TILE_K + LANES], settled[TILE_COLUMNS];  // the candidates; those of each chunk that are settled
+  ulong words[TILE_COLUMNS];  // candidates
+  ulong layers;               // that have one in any column
+  ushort entries[TILE_COLUMNS * VIEW_TILE_K + LANES],
+      settled[TILE_COLUMNS];  // the tile's, VIEW_TILE_K column + layer; settled ones by chunk
   uint entry_count;
   ushort views[MOST_VIEWS];
   uint view_count;
 } Tile;
 
-// Lists a tile's candidates. One work item does it.
-INLINE void list_entries(__local Tile* tile) {
-  uint count = 0, layers = 0;
-  for (int column = 0; column < TILE_COLUMNS; ++column) {
-    layers |= tile->open[column];
-    for (uint left = tile->open[column]; left != 0; left &= left - 1)
-      tile->entries[count++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
-  }
-  tile->entry_count = count;
-  tile->layers = layers;
+// Number of the word of a tile's column; -1 beyond the grid.
+INLINE int column_word(const Grid* g, int3 tile, int column) {
+  const int i = tile.x * VIEW_TILE + column % VIEW_TILE, j = tile.y * VIEW_TILE + column / VIEW_TILE;
+  return i < g->size_i && j < g->size_j ? word_index(g, i, j, tile.z * VIEW_TILE_K / 64) : -1;
 }
 
-// Takes those off the list that are settled. One work item does it.
-INLINE void drop_settled(__local Tile* tile) {
+// Loads the words of the tiles at tile.z and above.
+INLINE void load_words(const Grid* g, int3 tile, __global const ulong* candidates, __local Tile* own) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  for (int column = lane; column < TILE_COLUMNS; column += lanes) {
+    const int word = column_word(g, tile, column);
+    own->words[column] = word < 0 ? 0 : candidates[word];
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (lane == 0) {
+    ulong layers = 0;
+    for (int column = 0; column < TILE_COLUMNS; ++column) layers |= own->words[column];
+    own->layers = layers;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
+
+// Lists a tile's candidates. One work item does it, as with the next two.
+INLINE void list_entries(__local Tile* own, int3 tile) {
   uint count = 0;
-  for (uint first = 0; first < tile->entry_count; first += LANES) {
-    uint left = ~(uint)tile->settled[first / LANES] & ((1u << min(tile->entry_count - first, (uint)LANES)) - 1);
-    for (; left != 0; left &= left - 1) tile->entries[count++] = tile->entries[first + lowest_lane(left)];
-  }
-  tile->entry_count = count;
+  for (int column = 0; column < TILE_COLUMNS; ++column)
+    for (uint left = tile_layers(own->words[column], tile); left != 0; left &= left - 1)
+      own->entries[count++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
+  own->entry_count = count;
 }
 
-// Lists the views that may know something near a tile's candidates, newest first. One work item does it.
-INLINE void list_views(__local Tile* tile, __global const ushort* tile_views, int view_groups) {
+// Takes those off the list that are settled, and off their words.
+INLINE void drop_settled(__local Tile* own, int3 tile) {
+  uint count = 0;
+  for (uint first = 0; first < own->entry_count; first += LANES) {
+    const uint there = (1u << min(own->entry_count - first, (uint)LANES)) - 1, settled = own->settled[first / LANES] & there;
+    for (uint left = settled; left != 0; left &= left - 1) {
+      const uint entry = own->entries[first + lowest_lane(left)];
+      own->words[entry / VIEW_TILE_K] &= ~(1ul << (tile.z * VIEW_TILE_K % 64 + entry % VIEW_TILE_K));
+    }
+    for (uint left = there & ~settled; left != 0; left &= left - 1) own->entries[count++] = own->entries[first + lowest_lane(left)];
+  }
+  own->entry_count = count;
+}
+
+// Lists the views that may know something near a tile's candidates.
+INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int view_groups) {
   uint count = 0;
   for (int group = 0; group < view_groups; ++group)
-    for (uint left = tile_views[group]; left != 0; left &= left - 1) tile->views[count++] = (ushort)(group * LANES + lowest_lane(left));
-  tile->view_count = count;
+    for (uint left = tile_views[group]; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * LANES + lowest_lane(left));
+  own->view_count = count;
 }
 
-// One work-group a tile of VIEW_TILE x VIEW_TILE columns and VIEW_TILE_K layers.
-//   in  views[view_groups * LANES]: T_camera_world is from this frame's camera to the view's;  view_lanes: the same, by lanes;  depths:
-//       their images;  block_depths: the largest depth of each block of them;  layer_depth[size_k]
+// Which of LANES candidates of a tile are known to one of some views.
+//   asked: -1 where there is a candidate;  numbers[count]: of the views
+int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __local const ushort* numbers,
+                   int count, __global const float* depths, int16 entries, int16 asked) {
+  const int16 column = entries / VIEW_TILE_K;
+  const Voxels v = {tile.x * VIEW_TILE + column % VIEW_TILE, tile.y * VIEW_TILE + column / VIEW_TILE,
+                    tile.z * VIEW_TILE_K + entries % VIEW_TILE_K};
+  const Points center = voxel_centers(g, layer_depth, v);
+  int16 open = asked;
+  for (int n = 0; n < count && lane_bits(open) != 0; ++n) {
+    const View view = views[numbers[n]];
+    open &= ~knows(&view, depths, center, asked);  // not of `open` only: what is asked of a view must not wait for the view before
+  }
+  return asked & ~open;
+}
+
+// One work-group VIEW_TILE x VIEW_TILE columns and a word's layers: 64 / VIEW_TILE_K tiles, each of VIEW_TILE_K layers.
+//   in  views[view_groups * LANES];  view_lanes: the same, by lanes;  depths: their images;  block_depths: the largest depth of each block
+//       of them;  layer_depth[size_k]
 //   out tile_views[tiles][view_groups]: a bit for each view that may know something near a candidate of the tile
-//   i/o candidates: those that a view knows are cleared; VIEW_TILE_K bits each
+//   i/o candidates: those that a view knows are cleared
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
                                 const int view_groups, __global const float* depths, __global const float* block_depths,
-                                __global const float* layer_depth, __global ushort* tile_views, __global ushort* candidates) {
-  const int number = get_group_id(0), lane = get_local_id(0), lanes = get_local_size(0);
-  const int tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 4 * g.words_k;
-  const int3 at = (int3)(number % tiles_i, number / tiles_i / tiles_k, number / tiles_i % tiles_k);
-  __local Tile tile;
-  for (int column = lane; column < TILE_COLUMNS; column += lanes) {
-    const int bits = column_bits(&g, at, column);
-    tile.open[column] = bits < 0 ? 0 : candidates[bits];
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0) list_entries(&tile);
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (tile.layers == 0) return;
+                                __global const float* layer_depth, __global ushort* tile_views, __global ulong* candidates) {
+  const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K;
+  const int group = get_group_id(0), tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE;
+  int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
+  __local Tile own;
+  load_words(&g, tile, candidates, &own);
+  if (own.layers == 0) return;
 
-  const int first_layer = at.z * VIEW_TILE_K;
-  const Box box =
-      tile_box(&g, layer_depth, at.x, at.y, first_layer + lowest_lane(tile.layers), first_layer + 31 - (int)clz(tile.layers), min_gap);
-  __global ushort* own_views = tile_views + number * view_groups;
-  for (int group = lane; group < view_groups; group += lanes)
-    own_views[group] = (ushort)views_of_box(view_lanes + group * VIEW_LANE_FIELDS * LANES, views + group * LANES, block_depths, &box);
-  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-  if (lane == 0) list_views(&tile, own_views, view_groups);
-  barrier(CLK_LOCAL_MEM_FENCE);
+  const int first_tile = tile.z;
+  for (; tile.z < first_tile + tiles_of_word; ++tile.z) {
+    const uint layers = tile_layers(own.layers, tile);
+    if (layers == 0) continue;
+    if (lane == 0) list_entries(&own, tile);
+    const int first_layer = tile.z * VIEW_TILE_K;
+    const Box box =
+        tile_box(&g, layer_depth, tile.x, tile.y, first_layer + lowest_lane(layers), first_layer + 31 - (int)clz(layers), min_gap);
+    __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
+    for (int n = lane; n < view_groups; n += lanes)
+      own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, block_depths, &box);
+    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+    if (lane == 0) list_views(&own, own_views, view_groups);
+    barrier(CLK_LOCAL_MEM_FENCE);
 
-  // The newest views settle most; those left are listed anew before more views are asked, so that vectors have few lanes to spare.
-  for (uint first = 0, count = 1; first < tile.view_count && tile.entry_count != 0; first += count, count *= 2) {
-    const int entries = tile.entry_count, asked_views = min(count, tile.view_count - first);
-    for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
-      const int16 asked = lane_numbers() < entries - chunk * LANES;
-      const int16 candidate = asked ? convert_int16(vload16(chunk, tile.entries)) : 0;
-      tile.settled[chunk] =
-          (ushort)lane_bits(find_settled(&g, at, layer_depth, views, tile.views + first, asked_views, depths, candidate, asked));
+    // The first views settle most; those left are listed anew before more views are asked, so that vectors have few lanes to spare.
+    for (uint first = 0, count = 1; first < own.view_count && own.entry_count != 0; first += count, count *= 2) {
+      const int entries = own.entry_count, asked_views = min(count, own.view_count - first);
+      for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
+        const int16 asked = lane_numbers() < entries - chunk * LANES;
+        const int16 candidate = asked ? convert_int16(vload16(chunk, own.entries)) : 0;
+        own.settled[chunk] =
+            (ushort)lane_bits(find_settled(&g, tile, layer_depth, views, own.views + first, asked_views, depths, candidate, asked));
+      }
+      barrier(CLK_LOCAL_MEM_FENCE);
+      if (lane == 0) drop_settled(&own, tile);
+      barrier(CLK_LOCAL_MEM_FENCE);
     }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (lane == 0) drop_settled(&tile);
-    barrier(CLK_LOCAL_MEM_FENCE);
   }
 
-  for (int column = lane; column < TILE_COLUMNS; column += lanes) tile.open[column] = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0)
-    for (uint n = 0; n < tile.entry_count; ++n) tile.open[tile.entries[n] / VIEW_TILE_K] |= 1u << tile.entries[n] % VIEW_TILE_K;
-  barrier(CLK_LOCAL_MEM_FENCE);
   for (int column = lane; column < TILE_COLUMNS; column += lanes) {
-    const int bits = column_bits(&g, at, column);
-    if (bits >= 0) candidates[bits] = (ushort)tile.open[column];
+    const int word = column_word(&g, (int3)(tile.x, tile.y, first_tile), column);
+    if (word >= 0) candidates[word] = own.words[column];
   }
 }
 
@@ -246,24 +253,11 @@ int16 any_view_knows(const ViewsAround* around, __global const float* depths, Po
     for (int n = 0; n < around->tile_count; ++n) left |= around->tile_views[around->tiles[n] * around->view_groups + group];
     for (; left != 0; left &= left - 1) {
       const View view = around->views[group * LANES + lowest_lane(left)];
-      const Transform T = view.T_camera_world;
-      open &= ~knows(&view, depths, T.r00 * p.x + T.r01 * p.y + T.r02 * p.z + T.t0, T.r10 * p.x + T.r11 * p.y + T.r12 * p.z + T.t1,
-                     T.r20 * p.x + T.r21 * p.y + T.r22 * p.z + T.t2, open);
+      open &= ~knows(&view, depths, p, asked);
       if (lane_bits(open) == 0) return asked;
     }
   }
   return asked & ~open;
-}
-
-// at_surface of 2_observed_space, for voxels' centres at depths z.
-INLINE int16 at_surfaces(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, Voxels v,
-                         float16 z) {
-  const int16 s = v.i - g->padding_i, t = v.j - g->padding_j;
-  const int16 in_image = (s >= 0) & (t >= 0) & (s < g->width) & (t < g->height) & (convert_float16(v.k) > g->k_min);
-  const int16 pixel = in_image ? t * g->width + s : 0;
-  const float16 d = gather(depth, pixel);
-  const int16 ends = (v.k == gather_int(column_end, pixel)) & (v.k > g->first_pyramid_layer);
-  return in_image & (d > 0.0f) & (ends | ((z >= d) & (z <= d + surface_depth)));
 }
 
 // Frontier on a sheet of unknown thinner than min_gap, known on both sides, bounds nothing worth a look: left out. A thin body's surfaces
@@ -282,11 +276,12 @@ __kernel void close_gaps(const Grid g, const Limits limits, const View view, __g
   const Voxels v = voxels_of(&g, numbers);
   const Points center = voxel_centers(&g, layer_depth, v);
   const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
-  int16 open = exist & (lengths(direction) >= limits.normal_min) & ~at_surfaces(&g, depth, column_end, limits.surface_depth, v, center.z);
+  int16 pixel, open = exist & (lengths(direction) >= limits.normal_min);
+  open &= ~at_surface(&g, depth, column_end, limits.surface_depth, v, center.z, open, &pixel);
   const int16 asked = open;
   if (lane_bits(open) == 0) return;
   const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
-  open &= ~knows(&view, depths, behind.x, behind.y, behind.z, open);
+  open &= ~knows(&view, depths, behind, open);
   const ViewsAround around = views_around(&g, views, tile_views, view_groups, v);
   open &= ~any_view_knows(&around, depths, behind, open);
   int closed[LANES];

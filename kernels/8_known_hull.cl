@@ -84,26 +84,25 @@ INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfe
                axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
 }
 
-// One work item eight slots of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own
+// One work item LANES slots of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own
 // reach as a margin), enter it.
 //   in  lines: of 6_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
 __kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
                            __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
                            __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
   const uint item = get_global_id(0);
-  if (item >= PAGE_SLOTS / 8 * count) return;
-  const uint page = pages[item / (PAGE_SLOTS / 8)], first = PAGE_SLOTS * page + 8 * (item % (PAGE_SLOTS / 8));
-  const uint lanes = (uint)(alive[page] >> (first % PAGE_SLOTS)) & 0xff;
+  if (item >= PAGE_SLOTS / LANES * count) return;
+  const uint page = pages[item / (PAGE_SLOTS / LANES)], first = PAGE_SLOTS * page + LANES * (item % (PAGE_SLOTS / LANES));
+  const uint lanes = lanes_of_page(alive[page], first);
   if (lanes == 0) return;
-  const Surfels8 s = load_eight(&window, &T_camera_local, surfels, page_block[page], first);
-  int8 i, j, k;
-  voxels_of_eight(&g, s.x, s.y, s.z, &i, &j, &k);
-  const int8 reach = convert_int8(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.z, g.z_min)) + 2;
-  const int8 near_i = i >= -reach && i < g.size_i + reach, near_j = j >= -reach && j < g.size_j + reach;
-  const int8 near_k = k >= -reach && k < g.size_k + reach;
-  const int8 beyond = ((i < 0 || i >= g.size_i) && near_j && near_k) || ((j < 0 || j >= g.size_j) && near_i && near_k) ||
-                      ((k < 0 || k >= g.size_k) && near_i && near_j);
-  for (uint left = lanes & lanes_of(beyond); left != 0; left &= left - 1) {
+  const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+  const Voxels at = voxels_at(&g, s.position);
+  const int16 reach = convert_int16(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.position.z, g.z_min)) + 2;
+  const int16 near_i = (at.i >= -reach) & (at.i < g.size_i + reach), near_j = (at.j >= -reach) & (at.j < g.size_j + reach);
+  const int16 near_k = (at.k >= -reach) & (at.k < g.size_k + reach);
+  const int16 beyond = (((at.i < 0) | (at.i >= g.size_i)) & near_j & near_k) | (((at.j < 0) | (at.j >= g.size_j)) & near_i & near_k) |
+                       (((at.k < 0) | (at.k >= g.size_k)) & near_i & near_j);
+  for (uint left = lanes & lane_bits(beyond); left != 0; left &= left - 1) {
     const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + lowest_lane(left));
     enter_surfel(&g, &limits, &v, lines, faces);
   }

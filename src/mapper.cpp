@@ -104,11 +104,13 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   report.in_view = stages.select_in_view();
   report.split = stages.split_surfels();
 
-  // Removal - 3.4, eq. (12): decided now, done when the frame can no longer fail
+  // Candidates for creation - 3.5, eq. (13)
+  stages.find_candidates();
+
+  // Removal - 3.4, eq. (12): decided now, done when the frame can no longer fail. Voxels of surfels that stay are no candidates
   stages.mark_removed();
 
-  // Candidates for creation - 3.5, eq. (13) - without those that a recent view knows
-  stages.find_candidates();
+  // Candidates that a recent view knows are none
   stages.settle_by_recent_views();
 
   // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8)

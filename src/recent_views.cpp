@@ -19,36 +19,75 @@ std::vector<float> find_block_depths(const WorkingImage& image) {
   return blocks;
 }
 
+std::size_t squares(int pixels) { return (pixels + VIEW_SQUARE - 1) / VIEW_SQUARE; }
+
+/// A view's depths as the kernels read them: square by square, without the signs. What lies beyond the image's edges is 0.
+std::vector<float> by_squares(const WorkingImage& image) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
+  std::vector<float> depths(squares(width) * squares(height) * VIEW_SQUARE * VIEW_SQUARE, 0.0F);
+  for (int t = 0; t < height; ++t)
+    for (int s = 0; s < width; ++s) {
+      const std::size_t square = t / VIEW_SQUARE * squares(width) + s / VIEW_SQUARE;
+      depths[(square * VIEW_SQUARE + t % VIEW_SQUARE) * VIEW_SQUARE + s % VIEW_SQUARE] = std::abs(image.depth[t * width + s]);
+    }
+  return depths;
+}
+
+Transform to_transform(const Eigen::Matrix<double, 3, 4>& matrix) {
+  const Eigen::Matrix<float, 3, 4> m = matrix.cast<float>();
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2), m(0, 3), m(1, 3), m(2, 3)};
+}
+
+/// Camera to image; half a pixel is added, so that what is rounded down is the nearest pixel.
+Eigen::Matrix3d projection(const Intrinsics& camera) {
+  Eigen::Matrix3d K;
+  K << camera.fx, 0, camera.cx + 0.5, 0, camera.fy, camera.cy + 0.5, 0, 0, 1;
+  return K;
+}
+
 /// Puts a view into its lane of a group.
-void set_lane(const View& view, float* lane) {
-  const Transform& T = view.T_camera_world;
-  const float fields[VIEW_LANE_FIELDS] = {T.r00,
-                                          T.r01,
-                                          T.r02,
-                                          T.r10,
-                                          T.r11,
-                                          T.r12,
-                                          T.r20,
-                                          T.r21,
-                                          T.r22,
-                                          T.t0,
-                                          T.t1,
-                                          T.t2,
-                                          view.fx,
-                                          view.fy,
-                                          view.cx,
-                                          view.cy,
-                                          static_cast<float>(view.width),
-                                          static_cast<float>(view.height)};
-  for (int n = 0; n < VIEW_LANE_FIELDS; ++n) lane[n * LANES] = fields[n];
+void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, float* lane) {
+  const Eigen::Matrix3d R = T_view_camera.linear();
+  const Eigen::Vector3d t = T_view_camera.translation();
+  const double fields[VIEW_LANE_FIELDS] = {R(0, 0),
+                                           R(0, 1),
+                                           R(0, 2),
+                                           R(1, 0),
+                                           R(1, 1),
+                                           R(1, 2),
+                                           R(2, 0),
+                                           R(2, 1),
+                                           R(2, 2),
+                                           t.x(),
+                                           t.y(),
+                                           t.z(),
+                                           camera.fx,
+                                           camera.fy,
+                                           camera.cx,
+                                           camera.cy,
+                                           static_cast<double>(camera.width),
+                                           static_cast<double>(camera.height)};
+  for (int n = 0; n < VIEW_LANE_FIELDS; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
+}
+
+/// The kept views in an order in which each is far from those before it: what is still unknown after a few is unknown to most, and what is
+/// known has been found. Multiples of the golden section are spread so.
+std::vector<std::size_t> spread(std::size_t count) {
+  constexpr double kGolden = 0.6180339887498949;
+  std::vector<std::size_t> order;
+  std::vector<bool> taken(count, false);
+  for (std::size_t n = 0; n < count; ++n) {
+    std::size_t at = static_cast<std::size_t>(std::fmod(n * kGolden, 1.0) * count);
+    while (taken[at]) at = (at + 1) % count;
+    taken[at] = true;
+    order.push_back(at);
+  }
+  return order;
 }
 
 }  // namespace
 
-Transform to_transform(const Eigen::Isometry3d& T) {
-  const Eigen::Matrix<float, 3, 4> m = T.matrix().topRows<3>().cast<float>();
-  return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2), m(0, 3), m(1, 3), m(2, 3)};
-}
+Transform to_transform(const Eigen::Isometry3d& T) { return to_transform(Eigen::Matrix<double, 3, 4>(T.matrix().topRows<3>())); }
 
 RecentViews::RecentViews(Commands& commands, const Config& config)
     : config_(config),
@@ -64,10 +103,10 @@ void RecentViews::clear(bool map_is_empty) {
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
-  const std::vector<float> blocks = find_block_depths(image);
-  if (image.depth.size() > room_pixels_ || blocks.size() > room_blocks_) {
+  const std::vector<float> depths = by_squares(image), blocks = find_block_depths(image);
+  if (depths.size() > room_pixels_ || blocks.size() > room_blocks_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
-    const std::size_t most_pixels = std::max(image.depth.size(), room_pixels_), most_blocks = std::max(blocks.size(), room_blocks_);
+    const std::size_t most_pixels = std::max(depths.size(), room_pixels_), most_blocks = std::max(blocks.size(), room_blocks_);
     depths_.allocate((config_.recent_views + 1) * most_pixels);
     block_depths_.allocate((config_.recent_views + 1) * most_blocks);
     clear(kept_.empty() && complete_);
@@ -78,17 +117,13 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   for (const Kept& kept : kept_) taken[kept.room] = true;
   const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
   current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.write(image.depth, room * room_pixels_);
+  depths_.write(depths, room * room_pixels_);
   block_depths_.write(blocks, room * room_blocks_);
 }
 
-View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_camera_source) const {
+View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
   View view = {};
-  view.T_camera_world = to_transform(T_camera_source);
-  view.fx = static_cast<float>(kept.intrinsics.fx);
-  view.fy = static_cast<float>(kept.intrinsics.fy);
-  view.cx = static_cast<float>(kept.intrinsics.cx);
-  view.cy = static_cast<float>(kept.intrinsics.cy);
+  view.to_image = to_transform(Eigen::Matrix<double, 3, 4>(projection(kept.intrinsics) * T_view_camera.matrix().topRows<3>()));
   view.width = kept.intrinsics.width;
   view.height = kept.intrinsics.height;
   view.first_pixel = static_cast<std::uint32_t>(kept.room * room_pixels_);
@@ -100,11 +135,15 @@ View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d:
 
 int RecentViews::prepare() {
   std::vector<View> views;
-  for (const Kept& kept : kept_) views.push_back(to_view(kept, kept.T_world_camera.inverse() * current_.T_world_camera));
+  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * LANES, 0.0F);
+  for (const std::size_t number : spread(kept_.size())) {
+    const Kept& kept = kept_[number];
+    const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
+    set_lane(T_view_camera, kept.intrinsics, &lanes[views.size() / LANES * VIEW_LANE_FIELDS * LANES + views.size() % LANES]);
+    views.push_back(to_view(kept, T_view_camera));
+  }
   views_.resize(std::max<std::size_t>(config_.recent_views, 1));
   views_.write(views);
-  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * LANES, 0.0F);
-  for (std::size_t n = 0; n < views.size(); ++n) set_lane(views[n], &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
   view_lanes_.resize(1);
   view_lanes_.write(lanes);
   return static_cast<int>(views.size());

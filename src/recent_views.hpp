@@ -23,7 +23,7 @@ class RecentViews {
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
   View own_view() const;  ///< this frame's, as its own camera sees it
 
-  /// Sends the kept views, newest first, each with its pose relative to the current camera. @return how many there are
+  /// Sends the kept views, each with its pose relative to the current camera. @return how many there are
   int prepare();
 
   /// Keeps the current view if it adds something. @return whether it did
@@ -50,7 +50,7 @@ class RecentViews {
     Eigen::Isometry3d T_world_camera;
     std::size_t room = 0;  ///< in the pool, counted in images
   };
-  View to_view(const Kept& kept, const Eigen::Isometry3d& T_camera_source) const;
+  View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool adds_something() const;
 
   Config config_;

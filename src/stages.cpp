@@ -6,9 +6,9 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kGroup = 64;       // work items of a group, where kernels do not say otherwise
-constexpr std::size_t kGroupOfPage = 8;  // of kernels whose work items do eight surfels each
-constexpr double kHullReach = 1;         // times z_max: surfels further from the grid say nothing of the paths that enter it
+constexpr std::size_t kGroup = 64;                        // work items of a group, where kernels do not say otherwise
+constexpr std::size_t kGroupOfPage = PAGE_SLOTS / LANES;  // of kernels whose work items do LANES surfels each
+constexpr double kHullReach = 1;  // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
   Limits limits = {};
@@ -45,14 +45,13 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       valid_above_(commands),
       column_end_(commands),
       color_(commands),
-      pixels_i_(commands),
-      pixels_j_(commands),
+      columns_(commands),
+      rows_(commands),
       observed_(commands),
       events_(commands),
       hull_(commands),
       known_(commands),
       filtered_(commands),
-      occupied_voxels_(commands),
       candidates_(commands),
       hull_faces_(commands),
       lines_(commands),
@@ -101,8 +100,8 @@ void Stages::set_grid(const WorkingImage& image) {
   grid_ = view.grid;
   intrinsics_ = {};  // until all of it is there
   layer_depth_.write(view.layer_depth);
-  pixels_i_.write(view.pixels_i);
-  pixels_j_.write(view.pixels_j);
+  columns_.write(view.columns);
+  rows_.write(view.rows);
   column_end_.resize(image.depth.size());
   allocate_grid();
   intrinsics_ = image.intrinsics;
@@ -111,7 +110,6 @@ void Stages::set_grid(const WorkingImage& image) {
 void Stages::allocate_grid() {
   observed_.allocate(words());
   filtered_.allocate(words());
-  occupied_voxels_.allocate(words());
   candidates_.allocate(words());
 }
 
@@ -133,8 +131,8 @@ void Stages::observe_space() {
   const char* stage = "observed_space";
   commands_.run(stage, "column_ends", static_cast<std::size_t>(grid_.width) * grid_.height, kGroup, grid_, depth_(), layer_depth_(),
                 column_end_());
-  commands_.run(stage, "observed_space", word_range(), cl::NDRange(kGroup, 1, 1), grid_, column_end_(), valid_above_(), pixels_i_(),
-                pixels_j_(), observed_());
+  commands_.run(stage, "observed_space", word_range(), cl::NDRange(kGroup, 1, 1), grid_, column_end_(), valid_above_(), columns_.of_layer(),
+                rows_.of_layer(), columns_.of_run(), rows_.of_run(), columns_.layers(), rows_.layers(), observed_());
 }
 
 void Stages::mark_in_view() {
@@ -226,16 +224,15 @@ void Stages::filter_median() { commands_.run("median", "median", words(), kGroup
 void Stages::mark_removed() {
   const char* stage = "removal";
   const std::size_t pages = map_.window_pages();
-  occupied_voxels_.fill(stage, 0, words());
   removed_bits_.resize(pages + 1);
   commands_.run(stage, "mark_removed", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, views_.own_view(),
-                static_cast<cl_int>(config_.remove_buried), views_.depths(), map_.pages(), in_view_bits_(), map_.page_block(),
-                map_.surfels(), observed_(), occupied_voxels_(), removed_bits_());
+                static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
+                map_.pages(), in_view_bits_(), map_.page_block(), map_.surfels(), observed_(), candidates_(), map_.changed(),
+                removed_bits_());
 }
 
 void Stages::find_candidates() {
-  commands_.run("candidates", "find_candidates", word_range(), cl::NDRange(kGroup, 1, 1), grid_, observed_(), occupied_voxels_(),
-                candidates_());
+  commands_.run("candidates", "find_candidates", word_range(), cl::NDRange(kGroup, 1, 1), grid_, observed_(), candidates_());
 }
 
 void Stages::settle_by_recent_views() {
@@ -243,9 +240,9 @@ void Stages::settle_by_recent_views() {
   const int count = views_.prepare();
   if (count > 0) {
     const auto up = [](int size) { return static_cast<std::size_t>((size + VIEW_TILE - 1) / VIEW_TILE); };
-    const std::size_t tiles = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k * (64 / VIEW_TILE_K), group = large_group();
-    tile_views_.resize(tiles * views_.view_groups());
-    commands_.run(stage, "settle_candidates", tiles * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
+    const std::size_t words = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k, group = large_group();
+    tile_views_.resize(words * (64 / VIEW_TILE_K) * views_.view_groups());
+    commands_.run(stage, "settle_candidates", words * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
                   static_cast<cl_int>(views_.view_groups()), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(),
                   candidates_());
   }
@@ -307,8 +304,8 @@ std::size_t Stages::create_surfels() {
 
 void Stages::label_surfels() {
   commands_.run("labels", "label_surfels", kGroupOfPage * map_.window_pages(), kGroupOfPage, grid_, limits_, window_, T_camera_local_,
-                depth_(), column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), map_.alive(), map_.page_block(),
-                map_.surfels(), map_.changed());
+                depth_(), column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), map_.alive(), map_.changed(),
+                map_.page_block(), map_.surfels());
 }
 
 std::vector<BlockKey> Stages::finish_frame() { return map_.finish_frame("labels", frame_); }

@@ -15,6 +15,19 @@
 
 namespace frontier_surfels {
 
+/// CuboidPixels of 2_observed_space.
+struct CuboidPixelArrays {
+  explicit CuboidPixelArrays(Commands& commands) : of_layer(commands), of_run(commands), layers(commands) {}
+  void write(const CuboidPixels& pixels) {
+    of_layer.write(pixels.of_layer);
+    of_run.write(pixels.of_run);
+    layers.write(pixels.layers);
+  }
+
+  DeviceArray<PixelRange> of_layer, of_run;
+  DeviceArray<cl_ulong> layers;
+};
+
 class Stages {
  public:
   Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap& map, RecentViews& views);
@@ -34,8 +47,8 @@ class Stages {
   void compute_known_hull();                           ///< states in which paths enter the grid
   void sweep_paths();                                  ///< K'
   void filter_median();                                ///< K~
-  void mark_removed();                                 ///< surfels in observed space; nothing is removed yet
-  void find_candidates();                              ///< voxels for new surfels by C~, K~ and the surfels that stay
+  void find_candidates();                              ///< voxels for new surfels by C~
+  void mark_removed();                                 ///< surfels in observed space, to be removed; voxels of the others are no candidates
   void settle_by_recent_views();                       ///< candidates that a kept view knows are dropped
   void filter_candidates();                            ///< candidates without a normal are dropped
   std::size_t remove_surfels();  ///< @return how many; device memory for what create_surfels adds is made sure of before
@@ -81,10 +94,10 @@ class Stages {
   DeviceArray<float> depth_, layer_depth_;
   DeviceArray<cl_int> valid_above_, column_end_;
   DeviceArray<cl_uint> color_;
-  DeviceArray<PixelRange> pixels_i_, pixels_j_;
+  CuboidPixelArrays columns_, rows_;
 
   // Bit fields
-  DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, occupied_voxels_, candidates_;
+  DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, candidates_;
   DeviceArray<cl_uint> hull_faces_, lines_;
   DeviceArray<cl_ushort> tile_views_;
 

@@ -6,17 +6,45 @@
 namespace frontier_surfels {
 namespace {
 
-/// Pixels (of `pixels`) whose sample of layer k lies in each of `size` voxels: s with round((s - c) (k - k_p) / f + center) = voxel.
-void add_footprints(std::vector<PixelRange>& ranges, int size, int pixels, double c, double f, double layers, double center) {
-  const std::size_t first = ranges.size();
-  ranges.resize(first + size, PixelRange{0, 0});
-  for (int s = 0; s < pixels; ++s) {
-    const double voxel = std::floor((s - c) * layers / f + center + 0.5);
-    if (voxel < 0 || voxel >= size) continue;
-    PixelRange& range = ranges[first + static_cast<std::size_t>(voxel)];
+/// An axis of the cuboid and of the image.
+struct Axis {
+  int size, pixels;         ///< [voxel], [pixel]
+  double c, f;              ///< principal point, focal length [pixel]
+  int padding_k, layers_k;  ///< layers without samples; layers
+  double center;            ///< [voxel]
+};
+
+/// Pixels whose sample of layer k lies in each voxel: s with round((s - c) (k - k_p) / f + center) = voxel.
+void set_footprints(const Axis& axis, int k, PixelRange* ranges) {
+  for (int s = 0; s < axis.pixels; ++s) {
+    const double voxel = std::floor((s - axis.c) * (k - axis.padding_k) / axis.f + axis.center + 0.5);
+    if (voxel < 0 || voxel >= axis.size) continue;
+    PixelRange& range = ranges[static_cast<std::size_t>(voxel)];
     if (range[0] == range[1]) range[0] = static_cast<std::uint16_t>(s);
     range[1] = static_cast<std::uint16_t>(s + 1);
   }
+}
+
+void include(PixelRange& range, const PixelRange& other) {
+  range = range[0] == range[1] ? other : PixelRange{std::min(range[0], other[0]), std::max(range[1], other[1])};
+}
+
+CuboidPixels find_cuboid_pixels(const Axis& axis) {
+  const std::size_t words = (axis.layers_k + 63) / 64, size = axis.size;
+  CuboidPixels cuboid;
+  cuboid.of_layer.resize(64 * words * size, PixelRange{0, 0});
+  cuboid.of_run.resize(64 / LAYER_RUN * words * size, PixelRange{0, 0});
+  cuboid.layers.resize(words * size, 0);
+  for (int k = axis.padding_k; k < axis.layers_k; ++k) {
+    PixelRange* ranges = &cuboid.of_layer[k * size];
+    set_footprints(axis, k, ranges);
+    for (std::size_t voxel = 0; voxel < size; ++voxel) {
+      if (ranges[voxel][0] == ranges[voxel][1]) continue;
+      include(cuboid.of_run[k / LAYER_RUN * size + voxel], ranges[voxel]);
+      cuboid.layers[k / 64 * size + voxel] |= std::uint64_t{1} << k % 64;
+    }
+  }
+  return cuboid;
 }
 
 }  // namespace
@@ -56,11 +84,9 @@ ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
     const double z = k < k_min ? (k - config.padding_k) * config.z_min / f : config.z_min * std::exp((k - k_min) / f);
     view.layer_depth.push_back(static_cast<float>(z));
   }
-  for (int k = 0; k < g.first_pyramid_layer; ++k) {
-    const double layers = k - config.padding_k;
-    add_footprints(view.pixels_i, g.size_i, k < config.padding_k ? 0 : g.width, camera.cx, f, layers, camera.cx + config.padding_i);
-    add_footprints(view.pixels_j, g.size_j, k < config.padding_k ? 0 : g.height, camera.cy, f, layers, camera.cy + config.padding_j);
-  }
+  const int padding_k = config.padding_k, layers_k = g.first_pyramid_layer;
+  view.columns = find_cuboid_pixels({g.size_i, g.width, camera.cx, f, padding_k, layers_k, camera.cx + config.padding_i});
+  view.rows = find_cuboid_pixels({g.size_j, g.height, camera.cy, f, padding_k, layers_k, camera.cy + config.padding_j});
   return view;
 }
 

@@ -1,4 +1,4 @@
-/// The kernel of labels and colours against the columns of section 5, one surfel at a time.
+/// The kernels of labels and colours against the columns of section 5, one surfel at a time.
 
 #include <gtest/gtest.h>
 
@@ -46,17 +46,19 @@ Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, c
   return at_surface(scene.grid, scene.image, layer_depth, scene.camera.config.surface_depth, voxel.index, p.z());
 }
 
+/// @param are_new  all count as changed, whatever the labels do
 /// @return how many surfels lie at surfaces
-std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before) {
+std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before, bool are_new) {
   std::map<std::uint32_t, Surfel> after, changed;
   for (const Surfel& surfel : probe.map().download()) after[surfel.id] = surfel;
   probe.stages().finish_frame();
   for (const Surfel& surfel : probe.map().last_changes().updated) changed[surfel.id] = surfel;
-  EXPECT_EQ(after.size(), before.size());
+  EXPECT_TRUE(after.size() == before.size() || !are_new);
   const std::vector<float> layer_depth = probe.layer_depth();
   Comparison occupied("occupied"), colored("colour taken"), told("change told");
   std::size_t at_surfaces = 0;
   for (const Surfel& surfel : before) {
+    if (after.count(surfel.id) == 0) continue;  // in observed space
     const auto place = [&] { return "surfel " + std::to_string(surfel.id); };
     int pixel;
     const Truth at_surface = is_at_surface(scene, layer_depth, surfel, &pixel);
@@ -65,7 +67,7 @@ std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Su
     const Truth takes_color = at_surface && truth(!was_colored && !scene.image.color.empty());
     occupied.add(truth(was_occupied) || at_surface, actual.label == Label::kOccupied, place);
     colored.add(takes_color, actual.rgb != surfel.rgb, place);
-    told.add(takes_color || (at_surface && truth(!was_occupied)), changed.count(surfel.id) > 0, place);
+    told.add(truth(are_new) || takes_color || (at_surface && truth(!was_occupied)), changed.count(surfel.id) > 0, place);
     EXPECT_TRUE(actual.position == surfel.position && actual.normal == surfel.normal && actual.radius == surfel.radius) << place();
     at_surfaces += at_surface == Truth::yes;
     if (takes_color != Truth::yes) continue;
@@ -75,10 +77,12 @@ std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Su
   return at_surfaces;
 }
 
-std::size_t check(Camera camera, Content content, int count, bool with_color, double surface_depth) {
-  SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels" + (with_color ? ", colour" : "") + ", surface depth " +
-               std::to_string(surface_depth));
+std::size_t check(Camera camera, Content content, int count, bool with_color, double surface_depth, bool are_new) {
+  SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels" + (with_color ? ", colour" : "") + (are_new ? ", new" : "") +
+               ", surface depth " + std::to_string(surface_depth));
   camera.config.surface_depth = surface_depth;
+  camera.config.remove_buried = false;
+  camera.config.min_gap = 0;
   Random random(static_cast<unsigned>(count));
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), random_image(camera, content, random), random.pose(2, 3)};
   if (with_color)
@@ -89,28 +93,38 @@ std::size_t check(Camera camera, Content content, int count, bool with_color, do
   const std::vector<Surfel> before = probe.map().download();
   probe.stages().begin_frame(scene.image, scene.T_world_camera, 4);
   probe.stages().observe_space();
+  if (are_new) {
+    probe.change_all();
+  } else {
+    probe.stages().find_candidates();
+    probe.stages().select_in_view();
+    probe.stages().mark_removed();  // says which of those that stay are to be labelled
+    probe.stages().remove_surfels();
+  }
   probe.stages().label_surfels();
-  return compare(scene, probe, before);
+  return compare(scene, probe, before, are_new);
 }
 
 TEST(StageLabels, RandomSurfels) {
   std::size_t at_surfaces = 0;
   for (const Camera& camera : cameras())
-    for (const bool with_color : {false, true}) {
-      const int count = small_tests() ? 200 : 1500;
-      check(camera, Content::mixed, count, with_color, 0.03);
-      at_surfaces += check(camera, Content::all_valid, count, with_color, 0.03);
-      EXPECT_EQ(check(camera, Content::all_invalid, count, with_color, 0.03), 0u);
-    }
+    for (const bool with_color : {false, true})
+      for (const bool are_new : {false, true}) {
+        const int count = small_tests() ? 200 : 1500;
+        check(camera, Content::mixed, count, with_color, 0.03, are_new);
+        at_surfaces += check(camera, Content::all_valid, count, with_color, 0.03, are_new);
+        EXPECT_EQ(check(camera, Content::all_invalid, count, with_color, 0.03, are_new), 0u);
+      }
   EXPECT_GT(at_surfaces, small_tests() ? 5u : 50u) << "nothing was tested";
 }
 
 TEST(StageLabels, OnlyWhereColumnsEnd) {
-  for (const Camera& camera : cameras()) check(camera, Content::mixed, 500, true, 0);
+  for (const Camera& camera : cameras()) check(camera, Content::mixed, 500, true, 0, false);
 }
 
 TEST(StageLabels, NumbersOfSurfels) {
-  for (const int count : {0, 1, 63, 64, 65}) check(cameras().front(), Content::all_valid, count, true, 0.03);
+  for (const int count : {0, 1, 63, 64, 65})
+    for (const bool are_new : {false, true}) check(cameras().front(), Content::all_valid, count, true, 0.03, are_new);
 }
 
 }  // namespace

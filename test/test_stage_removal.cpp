@@ -1,4 +1,4 @@
-/// The kernels of removal: which surfels go, which voxels the others take, and what becomes of the map.
+/// The kernels of removal: which surfels go, which candidates the others leave, and what becomes of the map.
 
 #include <gtest/gtest.h>
 
@@ -16,15 +16,16 @@ using namespace reference;
 
 struct Expected {
   std::vector<Truth> removed;
-  Field<Truth> occupied_voxels;
+  Field<Truth> candidates;                     ///< those left
   std::size_t closed = 0, on_thin_bodies = 0;  ///< that go for the gap alone; that would, were they not occupied
 };
 
 /// Removed: in an observed voxel, or (where that is asked for) with its back side, r / 4 behind it, seen by this frame, or frontier that
 /// this frame sees min_gap behind.
 Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& view, const std::vector<Surfel>& map,
-                        const std::vector<ViewSurfel>& in_view, const Field<char>& observed) {
+                        const std::vector<ViewSurfel>& in_view, const Field<char>& observed, const Field<char>& candidates) {
   Expected expected = {{}, grid.field(Truth::no), 0, 0};
+  for_each_voxel(candidates, [&](int i, int j, int k) { expected.candidates(i, j, k) = truth(candidates(i, j, k)); });
   std::map<std::uint32_t, Surfel> by_slot;
   for (const Surfel& surfel : map) by_slot[surfel.id] = surfel;
   for (const ViewSurfel& s : in_view) {
@@ -47,8 +48,8 @@ Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& 
     }
     if (voxel.open) removed = Truth::open;
     expected.removed.push_back(removed);
-    Truth& occupied = expected.occupied_voxels(v.x(), v.y(), v.z());
-    occupied = occupied || !removed;
+    Truth& candidate = expected.candidates(v.x(), v.y(), v.z());
+    candidate = candidate && removed;
   }
   return expected;
 }
@@ -75,10 +76,11 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   EXPECT_EQ(probe.stages().split_surfels(), 0u);
   const Field<char> observed = random_field(probe.grid(), density, random);
   probe.set_observed(observed);
-  probe.set_occupied_voxels(random_field(probe.grid(), 0.5, random));  // what the last frame left must not matter
+  const Field<char> candidates = random_field(probe.grid(), 0.5, random);
+  probe.set_candidates(candidates);
 
   probe.stages().mark_removed();
-  const Expected expected = expect_removal(grid, camera.config, view, map, probe.place_surfels(), observed);
+  const Expected expected = expect_removal(grid, camera.config, view, map, probe.place_surfels(), observed, candidates);
   const std::vector<std::uint64_t> in_view_words = probe.in_view_words(), removed_words = probe.removed_words();
   for (std::size_t n = 0; n < in_view_words.size(); ++n) EXPECT_EQ(removed_words[n] & ~in_view_words[n], 0u) << "others are removed";
   const std::vector<std::uint32_t> in_view = probe.in_view_slots(), removed_slots = probe.slots_of(removed_words);
@@ -88,7 +90,7 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
     for (std::size_t n = 0; n < in_view.size(); ++n)
       comparison.add(expected.removed[n], removed.count(in_view[n]) != 0, [&] { return "slot " + std::to_string(in_view[n]); });
   }
-  expect_equal("voxels with surfels", expected.occupied_voxels, probe.occupied_voxels());
+  expect_equal("candidates left", expected.candidates, probe.candidates());
   return {removed.size(), expected};
 }
 

@@ -23,16 +23,9 @@ namespace {
   F(padding_j) F(padding_k) F(first_pyramid_layer) F(fx) F(fy) F(f) F(center_i) F(center_j) F(k_min) F(z_min) F(z_max) F(delta_min)
 #define TRANSFORM_FIELDS(F) F(r00) F(r01) F(r02) F(r10) F(r11) F(r12) F(r20) F(r21) F(r22) F(t0) F(t1) F(t2)
 #define WINDOW_FIELDS(F) F(origin_x) F(origin_y) F(origin_z) F(size_x) F(size_y) F(size_z) F(block_size)
-#define VIEW_FIELDS(F)                                                                                                               \
-  F(T_camera_world.r00)                                                                                                              \
-  F(T_camera_world.r01)                                                                                                              \
-  F(T_camera_world.r02)                                                                                                              \
-  F(T_camera_world.r10)                                                                                                              \
-  F(T_camera_world.r11)                                                                                                              \
-  F(T_camera_world.r12)                                                                                                              \
-  F(T_camera_world.r20)                                                                                                              \
-  F(T_camera_world.r21) F(T_camera_world.r22) F(T_camera_world.t0) F(T_camera_world.t1) F(T_camera_world.t2) F(fx) F(fy) F(cx) F(cy) \
-      F(width) F(height) F(first_pixel) F(first_block)
+#define VIEW_FIELDS(F)                                                                                                                    \
+  F(to_image.r00) F(to_image.r01) F(to_image.r02) F(to_image.r10) F(to_image.r11) F(to_image.r12) F(to_image.r20) F(to_image.r21)         \
+  F(to_image.r22) F(to_image.t0) F(to_image.t1) F(to_image.t2) F(width) F(height) F(first_pixel) F(first_block)
 #define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
 #define LIMITS_FIELDS(F) \
   F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(min_gap) F(surface_depth) F(median_votes)

@@ -1,4 +1,4 @@
-/// kernels/1_surfels.cl: eight surfels at a time against one after the other; packing is tested in test_surfel_packing.
+/// kernels/1_surfels.cl: LANES surfels at a time against one after the other; packing is tested in test_surfel_packing.
 
 #include <gtest/gtest.h>
 
@@ -12,37 +12,37 @@ namespace {
 
 using namespace reference;
 
-/// A work item eight points or surfels; out: first all that comes of vectors, then the same one at a time.
+/// A work item LANES points or surfels; out: first all that comes of vectors, then the same one at a time.
 const char* const kSource = R"CL(
 __kernel void test_voxels(__global int4* out, __global const float4* in, const Grid g) {
-  const int n = get_global_id(0), all = 8 * get_global_size(0);
-  float x[8], y[8], z[8];
-  for (int lane = 0; lane < 8; ++lane) {
-    x[lane] = in[8 * n + lane].x;
-    y[lane] = in[8 * n + lane].y;
-    z[lane] = in[8 * n + lane].z;
+  const int n = get_global_id(0), all = LANES * get_global_size(0);
+  float x[LANES], y[LANES], z[LANES];
+  for (int lane = 0; lane < LANES; ++lane) {
+    x[lane] = in[LANES * n + lane].x;
+    y[lane] = in[LANES * n + lane].y;
+    z[lane] = in[LANES * n + lane].z;
   }
-  int8 i, j, k;
-  int v_i[8], v_j[8], v_k[8], inside[8];
-  vstore8(voxels_of_eight(&g, vload8(0, x), vload8(0, y), vload8(0, z), &i, &j, &k), 0, inside);
-  vstore8(i, 0, v_i);
-  vstore8(j, 0, v_j);
-  vstore8(k, 0, v_k);
-  for (int lane = 0; lane < 8; ++lane) {
-    out[8 * n + lane] = (int4)(v_i[lane], v_j[lane], v_k[lane], inside[lane]);
-    const int3 v = voxel_of(to_grid(&g, in[8 * n + lane].xyz));
-    out[all + 8 * n + lane] = (int4)(v, inside_grid(&g, v) ? -1 : 0);
+  const Voxels v = voxels_at(&g, (Points){vload16(0, x), vload16(0, y), vload16(0, z)});
+  int i[LANES], j[LANES], k[LANES], inside[LANES];
+  vstore16(inside_grid16(&g, v), 0, inside);
+  vstore16(v.i, 0, i);
+  vstore16(v.j, 0, j);
+  vstore16(v.k, 0, k);
+  for (int lane = 0; lane < LANES; ++lane) {
+    out[LANES * n + lane] = (int4)(i[lane], j[lane], k[lane], inside[lane]);
+    const int3 one = voxel_of(to_grid(&g, in[LANES * n + lane].xyz));
+    out[all + LANES * n + lane] = (int4)(one, inside_grid(&g, one) ? -1 : 0);
   }
 }
 __kernel void test_load(__global float* out, __global const uint4* in, const Window window, const Transform T, const int4 block) {
-  const int n = get_global_id(0), all = 8 * get_global_size(0);
-  const Surfels8 s = load_eight(&window, &T, in, block, 8 * n);
-  float8 normals[3];
-  normals_of_eight(&s, &T, &normals[0], &normals[1], &normals[2]);
-  const float8 fields[9] = {s.x, s.y, s.z, s.radius, normals[0], normals[1], normals[2], as_float8(s.normal), as_float8(s.attributes)};
-  for (int field = 0; field < 9; ++field) vstore8(fields[field], 0, out + field * all + 8 * n);
+  const int n = get_global_id(0), all = LANES * get_global_size(0);
+  const Surfels s = load_surfels(&window, &T, in, block, LANES * n);
+  const Points normal = surfel_normals16(&s, &T);
+  const float16 fields[9] = {s.position.x, s.position.y, s.position.z, s.radius, normal.x, normal.y, normal.z, as_float16(s.normal),
+                             as_float16(s.attributes)};
+  for (int field = 0; field < 9; ++field) vstore16(fields[field], 0, out + field * all + LANES * n);
   out += 9 * all;
-  for (int lane = 8 * n; lane < 8 * n + 8; ++lane) {
+  for (int lane = LANES * n; lane < LANES * n + LANES; ++lane) {
     const float3 p = transform_point(&T, surfel_position(&window, in[lane], block)), normal = rotate(&T, unpack_normal(in[lane].z));
     const float one[9] = {p.x,      p.y,      p.z, surfel_radius(in[lane]), normal.x, normal.y, normal.z, as_float(in[lane].z),
                           as_float(in[lane].w)};
@@ -50,9 +50,14 @@ __kernel void test_load(__global float* out, __global const uint4* in, const Win
   }
 }
 __kernel void test_lanes(__global ulong* out, __global const int* in) {
-  __local uchar lanes[8];
-  for (int byte = 0; byte < 8; ++byte) lanes[byte] = lanes_of(vload8(byte, in + 64 * get_global_id(0)));
+  __local ushort lanes[PAGE_SLOTS / LANES];
+  for (int part = 0; part < PAGE_SLOTS / LANES; ++part) lanes[part] = (ushort)lane_bits(vload16(part, in + PAGE_SLOTS * get_global_id(0)));
   out[get_global_id(0)] = pack_lanes(lanes);
+}
+__kernel void test_marks(__global int* out, __global const ulong* in) {
+  const int n = get_global_id(0);
+  for (int part = 0; part < PAGE_SLOTS / LANES; ++part)
+    vstore16(lane_marks(lanes_of_page(in[n], LANES * part)), part, out + PAGE_SLOTS * n);
 }
 )CL";
 
@@ -80,7 +85,7 @@ std::vector<cl_float4> points(const Nuvg& grid, Random& random) {
   return all;
 }
 
-TEST(StageSurfels, VoxelsOfEightPoints) {
+TEST(StageSurfels, VoxelsOfPoints) {
   std::vector<Camera> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
   all.push_back(make_camera(20, 20, 10, 50, 60));
@@ -90,27 +95,27 @@ TEST(StageSurfels, VoxelsOfEightPoints) {
     const Nuvg grid(camera.intrinsics, camera.config);
     const std::vector<cl_float4> p = points(grid, random);
     const auto v =
-        kernels().run<cl_int4>("test_voxels", p.size() / 8, p, 2 * p.size(), make_view_grid(camera.intrinsics, camera.config).grid);
+        kernels().run<cl_int4>("test_voxels", p.size() / LANES, p, 2 * p.size(), make_view_grid(camera.intrinsics, camera.config).grid);
     std::size_t inside = 0, cuboid = 0;
     Comparison comparison("inside");
     for (std::size_t n = 0; n < p.size(); ++n) {
-      const cl_int4 &eight = v[n], &one = v[p.size() + n];
+      const cl_int4 &of_lane = v[n], &one = v[p.size() + n];
       const Vector3d at(p[n].s[0], p[n].s[1], p[n].s[2]);
-      for (int axis = 0; axis < 4; ++axis) ASSERT_EQ(eight.s[axis], one.s[axis]) << at.transpose();
+      for (int axis = 0; axis < 4; ++axis) ASSERT_EQ(of_lane.s[axis], one.s[axis]) << at.transpose();
       const Voxel expected = voxel_of(grid.to_grid(at), 1e-3);
       if (expected.open) continue;
-      comparison.add(truth(grid.contains(expected.index)), eight.s[3] != 0, [&] { return "a point"; });
-      if (eight.s[3] == 0) continue;
+      comparison.add(truth(grid.contains(expected.index)), of_lane.s[3] != 0, [&] { return "a point"; });
+      if (of_lane.s[3] == 0) continue;
       ++inside;
       cuboid += at.z() < grid.z_min;
-      EXPECT_EQ(Vector3i(eight.s[0], eight.s[1], eight.s[2]), expected.index) << at.transpose();
+      EXPECT_EQ(Vector3i(of_lane.s[0], of_lane.s[1], of_lane.s[2]), expected.index) << at.transpose();
     }
     EXPECT_GT(inside, 50u) << "nothing was tested";
     EXPECT_GT(cuboid, 10u) << "nothing was tested";
   }
 }
 
-TEST(StageSurfels, LoadingEight) {
+TEST(StageSurfels, Loading) {
   Random random(2);
   for (const double block_size : {0.5, 2.0})
     for (int run = 0; run < 10; ++run) {
@@ -129,7 +134,7 @@ TEST(StageSurfels, LoadingEight) {
         surfels.push_back(packed);
       }
       const Transform T = to_transform(random.pose(5, 3));
-      const auto out = kernels().run<float>("test_load", surfels.size() / 8, surfels, 18 * surfels.size(), window, T, block);
+      const auto out = kernels().run<float>("test_load", surfels.size() / LANES, surfels, 18 * surfels.size(), window, T, block);
       for (std::size_t n = 0; n < 9 * surfels.size(); ++n) {
         const std::size_t field = n / surfels.size();
         if (field >= 4 && field < 7) {
@@ -150,6 +155,7 @@ TEST(StageSurfels, BitsOfLanes) {
   for (const cl_ulong word : expected)
     for (int bit = 0; bit < 64; ++bit) lanes.push_back(word >> bit & 1 ? -1 : 0);
   EXPECT_TRUE(kernels().run<cl_ulong>("test_lanes", expected.size(), lanes, expected.size()) == expected);
+  EXPECT_TRUE(kernels().run<cl_int>("test_marks", expected.size(), expected, lanes.size()) == lanes);
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ Tally check(Camera camera, const Setup& setup, double observed_density, bool any
   Random random(static_cast<unsigned>(setup.frames));
   StagesProbe probe(camera.config);
   const Scene scene = prepare(camera, setup, observed_density, probe, random);
-  Field<char> all = anywhere ? random_field(probe.grid(), 0.5, random) : candidates(scene.observed, Field<char>(probe.grid(), 0));
+  Field<char> all = anywhere ? random_field(probe.grid(), 0.5, random) : candidates(scene.observed);
   for_each_voxel(all, [&](int i, int j, int k) { all(i, j, k) = all(i, j, k) && !scene.observed(i, j, k); });
   probe.set_candidates(all);
 

@@ -107,15 +107,16 @@ InsertionTime OctomapTruth::add(const DepthFrame& frame) {
   const octomap::Pointcloud cloud = to_octomap_cloud(frame, impl_->range);
   // A thread has a heap of its own. In the caller's, every allocation would search the great many small nodes that the tree has freed:
   // the mapper's frames between two insertions took 30 ms longer.
-  return std::async(std::launch::async, [&] {
-           const auto start = std::chrono::steady_clock::now();
-           const double cpu_before_ms = thread_cpu_ms();
-           // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is pruned at
-           // once, as octomap_server does.
-           impl_->tree.insertPointCloud(cloud, octomap_origin(frame), -1, false, false);
-           return InsertionTime{std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
-                                thread_cpu_ms() - cpu_before_ms};
-         })
+  return std::async(std::launch::async,
+                    [&] {
+                      const auto start = std::chrono::steady_clock::now();
+                      const double cpu_before_ms = thread_cpu_ms();
+                      // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is
+                      // pruned at once, as octomap_server does.
+                      impl_->tree.insertPointCloud(cloud, octomap_origin(frame), -1, false, false);
+                      return InsertionTime{std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
+                                           thread_cpu_ms() - cpu_before_ms};
+                    })
       .get();
 }
 

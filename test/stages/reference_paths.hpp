@@ -68,7 +68,7 @@ inline Field<char> median(const Field<char>& known, int votes) {
 }
 
 /// Voxels for new surfels - eq. (13), before it is asked whether they are known: unobserved, a 6-neighbour observed, no surfel there.
-inline Field<char> candidates(const Field<char>& observed, const Field<char>& occupied) {
+inline Field<char> candidates(const Field<char>& observed) {
   Field<char> found(observed.size_i, observed.size_j, observed.size_k, 0);
   const std::array<std::array<int, 3>, 6> sides = {{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
   for_each_voxel(observed, [&](int i, int j, int k) {
@@ -77,7 +77,7 @@ inline Field<char> candidates(const Field<char>& observed, const Field<char>& oc
       const int ni = i + side[0], nj = j + side[1], nk = k + side[2];
       if (observed.contains(ni, nj, nk) && observed(ni, nj, nk)) beside = true;
     }
-    found(i, j, k) = beside && !observed(i, j, k) && !occupied(i, j, k);
+    found(i, j, k) = beside && !observed(i, j, k);
   });
   return found;
 }

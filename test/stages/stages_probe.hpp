@@ -75,12 +75,10 @@ class StagesProbe {
   Bits observed() const { return read_bits(stages_.observed_); }
   Bits known() const { return read_bits(stages_.known_); }
   Bits filtered() const { return read_bits(stages_.filtered_); }
-  Bits occupied_voxels() const { return read_bits(stages_.occupied_voxels_); }
   Bits candidates() const { return read_bits(stages_.candidates_); }
   void set_observed(const Bits& bits) { stages_.observed_.write(reference::pack(bits)); }
   void set_known(const Bits& bits) { stages_.known_.write(reference::pack(bits)); }
   void set_filtered(const Bits& bits) { stages_.filtered_.write(reference::pack(bits)); }
-  void set_occupied_voxels(const Bits& bits) { stages_.occupied_voxels_.write(reference::pack(bits)); }
   void set_candidates(const Bits& bits) { stages_.candidates_.write(reference::pack(bits)); }
 
   /// @param family  0, 1, 2: paths along i, j, k; @param event  EVENT_ENTER_FORWARD and so on
@@ -129,6 +127,11 @@ class StagesProbe {
       poke(map_.alive(), slot / PAGE_SLOTS, word & ~(cl_ulong{1} << slot % PAGE_SLOTS));
     }
     map_.removed(slots.size());
+  }
+
+  /// As if all surfels of the window were new.
+  void change_all() {
+    for (const std::uint32_t page : window_pages()) poke(map_.changed(), page, ~cl_ulong{0});
   }
 
   cl_uint4 packed(std::uint32_t slot) const { return peek<cl_uint4>(map_.surfels(), slot); }
