@@ -28,7 +28,7 @@ namespace frontier_surfels {
 #define VIEW_BLOCK 8
 
 // So many layers of the cuboid are looked at together when space is observed.
-#define LAYER_RUN 8
+#define LAYER_RUN 16
 
 // Images of views are kept in squares of VIEW_SQUARE x VIEW_SQUARE pixels, row by row, and so are the pixels of a square: one is 64 bytes.
 // Points near each other are asked for together, and a row of pixels would be of use for one of them.
@@ -40,6 +40,12 @@ namespace frontier_surfels {
 
 // Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels.
 #define SIGN_FIELD_ONE 256
+
+// Numbers of surfels that kernels count as they go.
+#define COUNT_IN_VIEW 0
+#define COUNT_LARGE 1
+#define COUNT_REMOVED 2
+#define COUNTS 3
 
 // Elements that one work item adds up in a prefix sum.
 #define SCAN_CHUNK 64

@@ -34,6 +34,11 @@ INLINE Points transform_points(const Transform* T, Points p) {
                   T->r20 * p.x + T->r21 * p.y + T->r22 * p.z + T->t2};
 }
 
+INLINE Points rotate_points(const Transform* T, Points p) {
+  return (Points){T->r00 * p.x + T->r01 * p.y + T->r02 * p.z, T->r10 * p.x + T->r11 * p.y + T->r12 * p.z,
+                  T->r20 * p.x + T->r21 * p.y + T->r22 * p.z};
+}
+
 INLINE Points add_scaled(Points p, float16 scale, Points direction) {
   return (Points){p.x + scale * direction.x, p.y + scale * direction.y, p.z + scale * direction.z};
 }

@@ -85,10 +85,7 @@ INLINE Points surfel_normals16(const Surfels* s, const Transform* T_camera_local
   const float16 fold = fmax(-n.z, 0.0f);
   n.x += n.x < 0.0f ? fold : -fold;
   n.y += n.y < 0.0f ? fold : -fold;
-  const float16 length = lengths(n);
-  const Transform* T = T_camera_local;
-  return (Points){(T->r00 * n.x + T->r01 * n.y + T->r02 * n.z) / length, (T->r10 * n.x + T->r11 * n.y + T->r12 * n.z) / length,
-                  (T->r20 * n.x + T->r21 * n.y + T->r22 * n.z) / length};
+  return rotate_points(T_camera_local, normalized(n));
 }
 
 // Those that a measured surface would still tell something: that they are occupied, or their colour.

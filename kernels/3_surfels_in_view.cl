@@ -43,11 +43,11 @@ INLINE float3 ellipsoid_extents(const ViewSurfel* s, float thickness) {
 
 // One work item LANES surfels, one group a page of the window: which of them have an ellipsoid that may reach into the grid, generously,
 // and which must be split.
-//   in  pages[count]: those of the window;   out in_view[count], large[count]
+//   in  pages[count]: those of the window;   out in_view[count], large[count];   i/o counts: COUNT_IN_VIEW, COUNT_LARGE
 __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_in_view(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, __global const uint* pages,
     __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels, __global ulong* in_view,
-    __global ulong* large) {
+    __global ulong* large, __global uint* counts) {
   __local ushort in_view_lanes[PAGE_SLOTS / LANES], large_lanes[PAGE_SLOTS / LANES];
   const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
   in_view_lanes[item] = large_lanes[item] = 0;
@@ -66,8 +66,11 @@ __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void ma
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item > 0) return;
-  in_view[get_group_id(0)] = alive[page] & pack_lanes(in_view_lanes);
-  large[get_group_id(0)] = alive[page] & pack_lanes(large_lanes);
+  const ulong in_view_here = alive[page] & pack_lanes(in_view_lanes), large_here = alive[page] & pack_lanes(large_lanes);
+  in_view[get_group_id(0)] = in_view_here;
+  large[get_group_id(0)] = large_here;
+  if (in_view_here != 0) atomic_add(&counts[COUNT_IN_VIEW], (uint)popcount(in_view_here));
+  if (large_here != 0) atomic_add(&counts[COUNT_LARGE], (uint)popcount(large_here));
 }
 
 // How many times a large surfel must be halved until it is small enough.

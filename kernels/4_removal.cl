@@ -15,13 +15,13 @@ INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, _
 // One work item LANES surfels, one group a page of the window.
 //   in  in_view: which surfels are;  observed: C~, as 32-bit halves;  view, depths: this frame as its own camera sees it, for the exact
 //       test;  depth, column_end: of 2_observed_space
-//   i/o candidates: 32-bit halves: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
+//   i/o candidates: the same: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
 //   out removed[count]
 __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_removed(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
     const int has_color, __global const float* depths, __global const float* depth, __global const int* column_end,
     __global const uint* pages, __global const ulong* in_view, __global const int4* page_block, __global const uint4* surfels,
-    __global const int* observed, __global uint* candidates, __global ulong* changed, __global ulong* removed) {
+    __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* removed) {
   __local ushort removed_lanes[PAGE_SLOTS / LANES], labelled_lanes[PAGE_SLOTS / LANES];
   const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
   removed_lanes[item] = labelled_lanes[item] = 0;
@@ -40,12 +40,12 @@ __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void ma
       labelled_lanes[item] =
           (ushort)lane_bits(at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &pixel));
       removed_lanes[item] = (ushort)lane_bits(inside & ~stay);
-      uint halves[LANES], bits[LANES];
-      vstore16(as_uint16(at), 0, halves);
-      vstore16(as_uint16(bit), 0, bits);
-      for (uint left = lane_bits(stay); left != 0; left &= left - 1) {
+      int words[LANES], bits[LANES];
+      vstore16(at, 0, words);
+      vstore16(bit, 0, bits);
+      for (uint left = lane_bits(stay & ((gather_int(candidates, at) & bit) != 0)); left != 0; left &= left - 1) {
         const int n = lowest_lane(left);
-        if ((candidates[halves[n]] & bits[n]) != 0) atomic_and(&candidates[halves[n]], ~bits[n]);  // few are: an atomic is dear
+        atomic_and(&candidates[words[n]], ~bits[n]);
       }
     }
   }
@@ -56,10 +56,12 @@ __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void ma
 }
 
 // One work item a page of the window: slots of removed surfels become free.
+//   i/o counts: COUNT_REMOVED
 __kernel void remove_surfels(__global const uint* pages, const uint count, __global const ulong* removed, __global ulong* alive,
-                             __global ulong* changed) {
+                             __global ulong* changed, __global uint* counts) {
   const uint n = get_global_id(0);
-  if (n >= count) return;
+  if (n >= count || removed[n] == 0) return;
+  atomic_add(&counts[COUNT_REMOVED], (uint)popcount(removed[n]));
   alive[pages[n]] &= ~removed[n];
   changed[pages[n]] |= removed[n];
 }

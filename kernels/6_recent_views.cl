@@ -91,6 +91,9 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
 
 #define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
 
+// So many views are asked of every tile, before it is found out which of the others may know something there.
+#define FIRST_VIEWS 7
+
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
   ulong words[TILE_COLUMNS];  // candidates
@@ -126,7 +129,7 @@ INLINE void load_words(const Grid* g, int3 tile, __global const ulong* candidate
 
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
 
-// Lists a tile's candidates. One work item does it, as with the next two.
+// Lists a tile's candidates. One work item does it, and so the next ones.
 INLINE void list_entries(__local Tile* own, int3 tile) {
   uint count = 0;
   for (int column = 0; column < TILE_COLUMNS; ++column)
@@ -135,25 +138,38 @@ INLINE void list_entries(__local Tile* own, int3 tile) {
   own->entry_count = count;
 }
 
-// Takes those off the list that are settled, and off their words.
-INLINE void drop_settled(__local Tile* own, int3 tile) {
+// Takes those off the list that are settled.
+INLINE void drop_settled(__local Tile* own) {
   uint count = 0;
   for (uint first = 0; first < own->entry_count; first += LANES) {
-    const uint there = (1u << min(own->entry_count - first, (uint)LANES)) - 1, settled = own->settled[first / LANES] & there;
-    for (uint left = settled; left != 0; left &= left - 1) {
-      const uint entry = own->entries[first + lowest_lane(left)];
-      own->words[entry / VIEW_TILE_K] &= ~(1ul << (tile.z * VIEW_TILE_K % 64 + entry % VIEW_TILE_K));
-    }
-    for (uint left = there & ~settled; left != 0; left &= left - 1) own->entries[count++] = own->entries[first + lowest_lane(left)];
+    uint left = ~(uint)own->settled[first / LANES] & ((1u << min(own->entry_count - first, (uint)LANES)) - 1);
+    for (; left != 0; left &= left - 1) own->entries[count++] = own->entries[first + lowest_lane(left)];
   }
   own->entry_count = count;
 }
 
-// Lists the views that may know something near a tile's candidates.
+// Puts the candidates left in the place of the tile's.
+INLINE void keep_entries(__local Tile* own, int3 tile) {
+  const int first_bit = tile.z * VIEW_TILE_K % 64;
+  for (int column = 0; column < TILE_COLUMNS; ++column) own->words[column] &= ~(((1ul << VIEW_TILE_K) - 1) << first_bit);
+  for (uint n = 0; n < own->entry_count; ++n)
+    own->words[own->entries[n] / VIEW_TILE_K] |= 1ul << (first_bit + own->entries[n] % VIEW_TILE_K);
+}
+
+// Lists the first views.
+INLINE void list_first_views(__local Tile* own, int views) {
+  for (int n = 0; n < min(views, FIRST_VIEWS); ++n) own->views[n] = (ushort)n;
+  own->view_count = min(views, FIRST_VIEWS);
+}
+
+// Lists the others that may know something near a tile's candidates.
 INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int view_groups) {
   uint count = 0;
-  for (int group = 0; group < view_groups; ++group)
-    for (uint left = tile_views[group]; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * LANES + lowest_lane(left));
+  for (int group = 0; group < view_groups; ++group) {
+    uint left = tile_views[group];
+    if (group == 0) left &= ~((1u << FIRST_VIEWS) - 1);
+    for (; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * LANES + lowest_lane(left));
+  }
   own->view_count = count;
 }
 
@@ -173,15 +189,35 @@ int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, 
   return asked & ~open;
 }
 
+// Asks the listed views of a tile's candidates and drops those that one knows. They settle most at once; those left are listed anew before
+// more views are asked, so that vectors have few lanes to spare.
+INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __global const float* depths,
+                      uint count, __local Tile* own) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  for (uint first = 0; first < own->view_count && own->entry_count != 0; first += count, count *= 2) {
+    const int entries = own->entry_count, asked_views = min(count, own->view_count - first);
+    for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
+      const int16 asked = lane_numbers() < entries - chunk * LANES;
+      const int16 candidate = asked ? convert_int16(vload16(chunk, own->entries)) : 0;
+      own->settled[chunk] =
+          (ushort)lane_bits(find_settled(g, tile, layer_depth, views, own->views + first, asked_views, depths, candidate, asked));
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane == 0) drop_settled(own);
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+}
+
 // One work-group VIEW_TILE x VIEW_TILE columns and a word's layers: 64 / VIEW_TILE_K tiles, each of VIEW_TILE_K layers.
-//   in  views[view_groups * LANES];  view_lanes: the same, by lanes;  depths: their images;  block_depths: the largest depth of each block
-//       of them;  layer_depth[size_k]
-//   out tile_views[tiles][view_groups]: a bit for each view that may know something near a candidate of the tile
+//   in  views[view_count];  view_lanes: the same, by lanes;  depths: their images;  block_depths: the largest depth of each block of them;
+//       layer_depth[size_k]
+//   out tile_views[tiles][groups of LANES views]: of tiles with candidates left: a bit for each view that may know something near them
 //   i/o candidates: those that a view knows are cleared
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
-                                const int view_groups, __global const float* depths, __global const float* block_depths,
+                                const int view_count, __global const float* depths, __global const float* block_depths,
                                 __global const float* layer_depth, __global ushort* tile_views, __global ulong* candidates) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K;
+  const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
+            view_groups = (view_count + LANES - 1) / LANES;
   const int group = get_group_id(0), tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE;
   int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
   __local Tile own;
@@ -192,30 +228,26 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
   for (; tile.z < first_tile + tiles_of_word; ++tile.z) {
     const uint layers = tile_layers(own.layers, tile);
     if (layers == 0) continue;
-    if (lane == 0) list_entries(&own, tile);
-    const int first_layer = tile.z * VIEW_TILE_K;
-    const Box box =
-        tile_box(&g, layer_depth, tile.x, tile.y, first_layer + lowest_lane(layers), first_layer + 31 - (int)clz(layers), min_gap);
-    __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
-    for (int n = lane; n < view_groups; n += lanes)
-      own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, block_depths, &box);
-    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-    if (lane == 0) list_views(&own, own_views, view_groups);
-    barrier(CLK_LOCAL_MEM_FENCE);
-
-    // The first views settle most; those left are listed anew before more views are asked, so that vectors have few lanes to spare.
-    for (uint first = 0, count = 1; first < own.view_count && own.entry_count != 0; first += count, count *= 2) {
-      const int entries = own.entry_count, asked_views = min(count, own.view_count - first);
-      for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
-        const int16 asked = lane_numbers() < entries - chunk * LANES;
-        const int16 candidate = asked ? convert_int16(vload16(chunk, own.entries)) : 0;
-        own.settled[chunk] =
-            (ushort)lane_bits(find_settled(&g, tile, layer_depth, views, own.views + first, asked_views, depths, candidate, asked));
-      }
-      barrier(CLK_LOCAL_MEM_FENCE);
-      if (lane == 0) drop_settled(&own, tile);
-      barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane == 0) {
+      list_entries(&own, tile);
+      list_first_views(&own, view_count);
     }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    ask_views(&g, tile, layer_depth, views, depths, 1, &own);
+    if (own.entry_count != 0) {
+      const int first_layer = tile.z * VIEW_TILE_K;
+      const Box box =
+          tile_box(&g, layer_depth, tile.x, tile.y, first_layer + lowest_lane(layers), first_layer + 31 - (int)clz(layers), min_gap);
+      __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
+      for (int n = lane; n < view_groups; n += lanes)
+        own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, block_depths, &box);
+      barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+      if (lane == 0) list_views(&own, own_views, view_groups);
+      barrier(CLK_LOCAL_MEM_FENCE);
+      ask_views(&g, tile, layer_depth, views, depths, FIRST_VIEWS, &own);
+    }
+    if (lane == 0) keep_entries(&own, tile);
+    barrier(CLK_LOCAL_MEM_FENCE);
   }
 
   for (int column = lane; column < TILE_COLUMNS; column += lanes) {

@@ -6,25 +6,26 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kScanFew = 2048;  // so many values one work item scans alone
+constexpr std::size_t kFew = 2048, kFewOfCpu = 32768;  // a launch takes as long
 
 }  // namespace
 
 Lists::Lists(Commands& commands)
     : commands_(commands),
+      few_(commands.device().is_cpu ? kFewOfCpu : kFew),
       counts_(commands),
       levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
               DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
 
 std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
   if (count == 0) return 0;
-  scan_level(stage, values, count, 0);
+  sum_up(stage, values, count);
   return values.read_one(count);
 }
 
 void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
-  if (count <= kScanFew) {
+  if (count <= few_) {
     commands_.run(stage, "scan_few", 1, 1, values(), n);
     return;
   }
@@ -36,15 +37,11 @@ void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::siz
   commands_.run(stage, "scan_chunks", chunks, kGroup, values(), n, sums());
 }
 
-std::uint32_t Lists::count_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count) {
+std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
   if (count == 0) return 0;
   counts_.resize(count + 1);
   commands_.run(stage, "count_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_());
-  return scan(stage, counts_, count);
-}
-
-std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
-  const std::uint32_t total = count_bits(stage, bits, count);
+  const std::uint32_t total = scan(stage, counts_, count);
   list.resize(total);
   if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_(), list());
   return total;

@@ -11,11 +11,13 @@ class Lists {
  public:
   explicit Lists(Commands& commands);
 
-  /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total. @return the total
-  std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
+  /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total
+  void sum_up(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
+    if (count > 0) scan_level(stage, values, count, 0);
+  }
 
-  /// @param count  words. @return set bits in them
-  std::uint32_t count_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count);
+  /// The same. @return the total
+  std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
 
   /// The numbers 64 n + bit of set bits, ascending. @param count  words. @return how many
   std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
@@ -24,6 +26,7 @@ class Lists {
   void scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level);
 
   Commands& commands_;
+  std::size_t few_;  ///< so many values one work item scans alone
   DeviceArray<cl_uint> counts_;
   DeviceArray<cl_uint> levels_[5];  ///< sums of chunks, of chunks of chunks, ...
 };

@@ -117,8 +117,8 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   for (const Kept& kept : kept_) taken[kept.room] = true;
   const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
   current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.write(depths, room * room_pixels_);
-  block_depths_.write(blocks, room * room_blocks_);
+  depths_.send(depths, room * room_pixels_);
+  block_depths_.send(blocks, room * room_blocks_);
 }
 
 View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
@@ -143,9 +143,9 @@ int RecentViews::prepare() {
     views.push_back(to_view(kept, T_view_camera));
   }
   views_.resize(std::max<std::size_t>(config_.recent_views, 1));
-  views_.write(views);
+  views_.send(views);
   view_lanes_.resize(1);
-  view_lanes_.write(lanes);
+  view_lanes_.send(std::move(lanes));
   return static_cast<int>(views.size());
 }
 

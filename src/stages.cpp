@@ -61,6 +61,7 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       around_(commands),
       created_(commands),
       directions_(commands),
+      counts_(commands),
       in_view_bits_(commands),
       large_bits_(commands),
       removed_bits_(commands),
@@ -87,11 +88,11 @@ void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_w
   window_ = map_.window().window();
   T_camera_local_ = to_transform(map_.window().T_camera_local());
   T_local_camera_ = to_transform(map_.window().T_camera_local().inverse());
-  depth_.write(image.depth);
-  valid_above_.write(image.valid_above);
+  depth_.send(image.depth);
+  valid_above_.send(image.valid_above);
   has_color_ = !image.color.empty();
   color_.resize(1);
-  color_.write(image.color);
+  color_.send(image.color);
   views_.set_current(image, T_world_camera);
 }
 
@@ -140,19 +141,23 @@ void Stages::mark_in_view() {
   const std::size_t pages = map_.window_pages();
   in_view_bits_.resize(pages + 1);
   large_bits_.resize(pages + 1);
+  counts_.resize(COUNTS);
+  counts_.fill(stage, 0, COUNTS);
   commands_.run(stage, "mark_in_view", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, map_.pages(),
-                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_(), large_bits_());
+                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_(), large_bits_(), counts_());
 }
 
 std::size_t Stages::select_in_view() {
   mark_in_view();
-  return lists_.count_bits("in_view", in_view_bits_, map_.window_pages());
+  const std::vector<cl_uint> counts = counts_.read(COUNTS);
+  large_ = counts[COUNT_LARGE];
+  return counts[COUNT_IN_VIEW];
 }
 
 std::size_t Stages::split_surfels() {
+  if (large_ == 0) return 0;
   const char* stage = "split";
   const std::uint32_t parents = lists_.list_bits(stage, large_bits_, map_.window_pages(), split_slots_);
-  if (parents == 0) return 0;
   commands_.run(stage, "to_slots", parents, kGroup, map_.pages(), split_slots_(), parents);
   split_offsets_.resize(parents + 1);
   commands_.run(stage, "count_children", parents, kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
@@ -243,8 +248,7 @@ void Stages::settle_by_recent_views() {
     const std::size_t words = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k, group = large_group();
     tile_views_.resize(words * (64 / VIEW_TILE_K) * views_.view_groups());
     commands_.run(stage, "settle_candidates", words * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
-                  static_cast<cl_int>(views_.view_groups()), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(),
-                  candidates_());
+                  static_cast<cl_int>(count), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(), candidates_());
   }
   list_candidates();
   tile_views_.resize(1);
@@ -285,9 +289,10 @@ std::size_t Stages::remove_surfels() {
   map_.reserve(created_count_);
   new_surfels_.resize(created_count_);
   new_cells_.resize(created_count_);
-  const std::size_t pages = map_.window_pages(), count = lists_.count_bits(stage, removed_bits_, pages);
+  const std::size_t pages = map_.window_pages();
   commands_.run(stage, "remove_surfels", pages, kGroup, map_.pages(), static_cast<cl_uint>(pages), removed_bits_(), map_.alive(),
-                map_.changed());
+                map_.changed(), counts_());
+  const std::size_t count = counts_.read_one(COUNT_REMOVED);
   map_.removed(count);
   return count;
 }

@@ -88,7 +88,7 @@ class Stages {
   Window window_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
-  std::size_t in_view_ = 0, listed_count_ = 0, created_count_ = 0;
+  std::size_t large_ = 0, in_view_ = 0, listed_count_ = 0, created_count_ = 0;
 
   // Image and grid
   DeviceArray<float> depth_, layer_depth_;
@@ -107,6 +107,7 @@ class Stages {
   DeviceArray<float> directions_;
 
   // Surfels in view
+  DeviceArray<cl_uint> counts_;
   DeviceArray<cl_ulong> in_view_bits_, large_bits_, removed_bits_;
   DeviceArray<cl_uint> in_view_slots_, split_slots_, split_offsets_;
   DeviceArray<ViewSurfel> view_surfels_;

@@ -103,9 +103,9 @@ void SurfelMap::list_window() {
     }
     cell_pages_.push_back(static_cast<cl_uint>(window_pages_.size()));
   }
-  pages_list_.write(window_pages_);
-  page_cells_list_.write(page_cells_);
-  cell_pages_list_.write(cell_pages_);
+  pages_list_.send(window_pages_);
+  page_cells_list_.send(page_cells_);
+  cell_pages_list_.send(cell_pages_);
 }
 
 /// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
@@ -140,7 +140,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   histogram_.resize(bins + 1);
   histogram_.fill(stage, 0, bins);
   commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, histogram_());
-  lists_.scan(stage, histogram_, bins);
+  lists_.sum_up(stage, histogram_, bins);
   cell_begin_.resize(cell_count + 1);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_count, cell_begin_());
   order_.resize(count);
@@ -161,7 +161,7 @@ void SurfelMap::count_free(const char* stage) {
   free_before_.resize(window_pages() + 1);
   if (window_pages() == 0) free_before_.fill(stage, 0, 1);
   commands_.run(stage, "count_free", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), alive_(), free_before_());
-  lists_.scan(stage, free_before_, window_pages());
+  lists_.sum_up(stage, free_before_, window_pages());
 }
 
 /// @param missing  pages that each cell's block needs
@@ -177,10 +177,10 @@ void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing
     }
   }
   if (pages.empty()) return;
-  new_pages_.write(pages);
-  new_blocks_.write(blocks);
-  commands_.run(stage, "begin_new_pages", pages.size(), kGroup, new_pages_(), new_blocks_(), static_cast<cl_uint>(pages.size()), alive_(),
-                changed_(), page_block_());
+  const auto count = static_cast<cl_uint>(pages.size());
+  new_pages_.send(std::move(pages));
+  new_blocks_.send(std::move(blocks));
+  commands_.run(stage, "begin_new_pages", count, kGroup, new_pages_(), new_blocks_(), count, alive_(), changed_(), page_block_());
   list_window();
   count_free(stage);
 }

@@ -40,8 +40,23 @@ Commands::Commands(Device device) : device_(std::move(device)) {
   }
 }
 
+Commands::~Commands() {
+  try {
+    if (!kept_.empty()) queue_.finish();  // a frame that failed may still be reading
+  } catch (const cl::Error&) {
+    // Then it is not.
+  }
+}
+
+void Commands::forget_times() {
+  if (!kept_.empty()) queue_.finish();
+  kept_.clear();
+  events_.clear();
+}
+
 std::vector<StageTime> Commands::take_times() {
   queue_.finish();
+  kept_.clear();
   std::vector<StageTime> times;
   for (const auto& [stage, event] : events_) {
     auto found = std::find_if(times.begin(), times.end(), [&name = stage](const StageTime& time) { return time.name == name; });

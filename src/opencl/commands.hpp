@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,9 @@ namespace frontier_surfels {
 class Commands {
  public:
   explicit Commands(Device device);
+  ~Commands();
+  Commands(const Commands&) = delete;
+  Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
   cl::CommandQueue& queue() { return queue_; }
@@ -38,8 +42,11 @@ class Commands {
   /// Waits for all launches; device time of each stage since the last call, in the order of their first launch.
   std::vector<StageTime> take_times();
 
-  /// Drops the times noted so far.
-  void forget_times() { events_.clear(); }
+  /// Drops the times noted so far. Waits for all launches.
+  void forget_times();
+
+  /// Keeps what a command reads from until all launches are done.
+  void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
   std::size_t most_bytes() const { return most_bytes_; }  ///< that a buffer may have
   cl::Buffer allocate(std::size_t bytes);
@@ -51,6 +58,7 @@ class Commands {
   cl::CommandQueue queue_;
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
+  std::vector<std::shared_ptr<const void>> kept_;
   std::size_t allocated_bytes_ = 0, most_bytes_ = 0;
 };
 
@@ -84,6 +92,15 @@ class DeviceArray {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
     commands_->queue().enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
+  }
+
+  /// The same without waiting for it, nor for what is running.
+  void send(std::vector<T> values, std::size_t offset = 0) {
+    if (values.empty()) return;
+    grow(offset + values.size(), offset);
+    const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
+    commands_->keep(kept);
+    commands_->queue().enqueueWriteBuffer(buffer_, CL_FALSE, offset * sizeof(T), kept->size() * sizeof(T), kept->data());
   }
 
   std::vector<T> read(std::size_t size, std::size_t offset = 0) const {
