@@ -126,13 +126,17 @@ class Pages {
     const std::vector<Surfel> all = map().download();
     EXPECT_EQ(map().size(), book_.surfels.size());
     ASSERT_EQ(all.size(), book_.surfels.size());
+    const std::size_t pages = all.empty() ? 0 : all.back().id / PAGE_SLOTS + 1;
+    const std::vector<cl_uint4> packed_slots = probe_.packed_of(pages);
+    const std::vector<cl_int4> page_blocks = probe_.blocks_of(pages);
     auto expected = book_.surfels.begin();
     for (std::size_t n = 0; n < all.size(); ++n, ++expected) {
       ASSERT_EQ(all[n].id, expected->first) << "not by slot";
-      const cl_uint4 packed = probe_.packed(all[n].id);
+      const cl_uint4& packed = packed_slots[all[n].id];
       ASSERT_EQ(to_array(packed), expected->second);
       const BlockKey block = book_.pages.at(all[n].id / PAGE_SLOTS);
-      ASSERT_TRUE(probe_.block_of_slot(all[n].id) == block);
+      const cl_int4& at = page_blocks[all[n].id / PAGE_SLOTS];
+      ASSERT_TRUE((BlockKey{at.s[0], at.s[1], at.s[2]} == block));
       Surfel surfel = frontier_surfels::unpack(packed, block, kBlock);
       surfel.id = all[n].id;
       EXPECT_TRUE(surfel.position == all[n].position && surfel.label == all[n].label && surfel.rgb == all[n].rgb);

@@ -134,6 +134,10 @@ class StagesProbe {
     for (const std::uint32_t page : window_pages()) poke(map_.changed(), page, ~cl_ulong{0});
   }
 
+  /// Of the first pages: all slots, and the block of each page.
+  std::vector<cl_uint4> packed_of(std::size_t pages) const { return peek_all<cl_uint4>(map_.surfels(), PAGE_SLOTS * pages); }
+  std::vector<cl_int4> blocks_of(std::size_t pages) const { return peek_all<cl_int4>(map_.page_block(), pages); }
+
   cl_uint4 packed(std::uint32_t slot) const { return peek<cl_uint4>(map_.surfels(), slot); }
   std::uint32_t attributes(std::uint32_t slot) const { return packed(slot).s[3]; }
   bool is_alive(std::uint32_t slot) const { return peek<cl_ulong>(map_.alive(), slot / PAGE_SLOTS) >> slot % PAGE_SLOTS & 1; }
@@ -212,9 +216,15 @@ class StagesProbe {
     const auto key = [](const cl_uint4& p, const BlockKey& b) {
       return std::array<std::int64_t, 7>{p.s[0], p.s[1], p.s[2], p.s[3], b.x, b.y, b.z};
     };
-    for (const Surfel& surfel : map_.download()) {
+    const std::vector<Surfel> all = map_.download();
+    const std::size_t pages = all.empty() ? 0 : all.back().id / PAGE_SLOTS + 1;
+    const std::vector<cl_uint4> packed_slots = packed_of(pages);
+    const std::vector<cl_int4> blocks = blocks_of(pages);
+    for (const Surfel& surfel : all) {
       if (but.count(surfel.id) != 0) continue;
-      EXPECT_TRUE(slots.emplace(key(packed(surfel.id), block_of_slot(surfel.id)), surfel.id).second) << "two surfels are the same";
+      const cl_int4& block = blocks[surfel.id / PAGE_SLOTS];
+      EXPECT_TRUE(slots.emplace(key(packed_slots[surfel.id], {block.s[0], block.s[1], block.s[2]}), surfel.id).second)
+          << "two surfels are the same";
     }
     EXPECT_EQ(slots.size(), surfels.size()) << "so many are new";
     std::vector<std::uint32_t> found;
@@ -275,6 +285,12 @@ class StagesProbe {
     T value;
     commands_.queue().enqueueReadBuffer(buffer, CL_TRUE, index * sizeof(T), sizeof(T), &value);
     return value;
+  }
+  template <typename T>
+  std::vector<T> peek_all(const cl::Buffer& buffer, std::size_t count) const {
+    std::vector<T> values(count);
+    if (count > 0) commands_.queue().enqueueReadBuffer(buffer, CL_TRUE, 0, count * sizeof(T), values.data());
+    return values;
   }
   template <typename T>
   void poke(const cl::Buffer& buffer, std::size_t index, const T& value) {
