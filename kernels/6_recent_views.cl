@@ -92,7 +92,7 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
 #define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
 
 // So many views are asked of every tile, before it is found out which of the others may know something there.
-#define FIRST_VIEWS 7
+#define FIRST_VIEWS 6
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
@@ -233,7 +233,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
       list_first_views(&own, view_count);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    ask_views(&g, tile, layer_depth, views, depths, 1, &own);
+    ask_views(&g, tile, layer_depth, views, depths, 2, &own);
     if (own.entry_count != 0) {
       const int first_layer = tile.z * VIEW_TILE_K;
       const Box box =
