@@ -79,7 +79,7 @@ INLINE Surfels load_surfels(const Window* window, const Transform* T_camera_loca
 }
 
 // Their normals, camera frame.
-INLINE Points surfel_normals16(const Surfels* s, const Transform* T_camera_local) {
+INLINE Points stored_normals(const Surfels* s, const Transform* T_camera_local) {
   Points n = {convert_float16(as_int16(s->normal << 16) >> 16), convert_float16(as_int16(s->normal) >> 16), 0.0f};
   n.z = 32767.0f - fabs(n.x) - fabs(n.y);
   const float16 fold = fmax(-n.z, 0.0f);

@@ -1,5 +1,6 @@
-// Removal - paper 3.4, eq. (12): surfels in observed space go; voxels of the others are no candidates for new ones.
-// Ours: so do those whose back this frame has seen, and frontier on a sheet of unknown thinner than min_gap.
+// Removal - paper 3.4, eq. (12): surfels in observed space go; voxels of the others are no candidates for new ones. Which of these are to
+// be labelled (12_labels) is found out on the way. Ours: so do those whose back this frame has seen, and frontier on a sheet of unknown
+// thinner than min_gap.
 
 // Which surfels go, of those inside the grid.
 INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, __global const float* depths, const Surfels* s,
@@ -15,7 +16,7 @@ INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, _
 // One work item LANES surfels, one group a page of the window.
 //   in  in_view: which surfels are;  observed: C~, as 32-bit halves;  view, depths: this frame as its own camera sees it, for the exact
 //       test;  depth, column_end: of 2_observed_space
-//   i/o candidates: the same: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
+//   i/o candidates: as 32-bit halves: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
 //   out removed[count]
 __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_removed(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
@@ -34,7 +35,7 @@ __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void ma
       const int16 at = inside ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + ((v.k >> 5) & 1) : 0;
       const int16 bit = (int16)(1) << (v.k & 31);
       int16 stay = inside & ((gather_int(observed, at) & bit) == 0);
-      stay &= ~leaves(&limits, &view, remove_buried, depths, &s, surfel_normals16(&s, &T_camera_local), stay);
+      stay &= ~leaves(&limits, &view, remove_buried, depths, &s, stored_normals(&s, &T_camera_local), stay);
       int16 pixel;
       const int16 unlabelled = stay & lacks_label(s.attributes, has_color);
       labelled_lanes[item] =

@@ -1,5 +1,5 @@
-// Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones that no surfel has taken.
-// Whether they are known is asked of the recent views first, and of the surfels only where those leave it open.
+// Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones. 4_removal takes those off that have a
+// surfel. Whether they are known is asked of the recent views first, and of the surfels only where those leave it open.
 
 // Voxels by their numbers, 64 word + bit.
 INLINE Voxels voxels_of(const Grid* g, int16 numbers) {

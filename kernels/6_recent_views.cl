@@ -91,7 +91,7 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
 
 #define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
 
-// So many views are asked of every tile, before it is found out which of the others may know something there.
+// So many views are asked of every tile, before it is found out which of the others may know something there. No more than LANES.
 #define FIRST_VIEWS 6
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
@@ -189,8 +189,9 @@ int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, 
   return asked & ~open;
 }
 
-// Asks the listed views of a tile's candidates and drops those that one knows. They settle most at once; those left are listed anew before
-// more views are asked, so that vectors have few lanes to spare.
+// Asks the listed views of a tile's candidates, and drops those that one knows. The first views settle most of them; those left are listed
+// anew before more views are asked, so that vectors have few lanes to spare.
+//   count: of the views that are asked at first; then twice as many, and so on
 INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __global const float* depths,
                       uint count, __local Tile* own) {
   const int lane = get_local_id(0), lanes = get_local_size(0);
@@ -266,7 +267,7 @@ typedef struct {
 
 INLINE ViewsAround views_around(const Grid* g, __global const View* views, __global const ushort* tile_views, int view_groups, Voxels v) {
   ViewsAround around = {views, tile_views, view_groups, {0}, 0};
-  const int tiles_i = (g->size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 4 * g->words_k;
+  const int tiles_i = (g->size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 64 / VIEW_TILE_K * g->words_k;
   int tiles[LANES];
   vstore16((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
   for (int n = 0; n < LANES; ++n) {

@@ -28,7 +28,7 @@ def panels(count):
 
 
 def time_per_frame(frames, stages):
-    """`frames`: table of frames.csv; `stages`: names of its columns with stage times, in the paper's order."""
+    """`frames`: table of frames.csv; `stages`: names of its columns with stage times, in their order."""
     figure, (stacked, beside) = panels(2)
     index = range(len(frames))
     stacked.stackplot(index, [frames[name] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)

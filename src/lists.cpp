@@ -6,7 +6,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kFew = 2048, kFewOfCpu = 32768;  // a launch takes as long
+constexpr std::size_t kFew = 2048, kFewOfCpu = 32768;  // one more launch would take longer
 
 }  // namespace
 
@@ -19,7 +19,7 @@ Lists::Lists(Commands& commands)
 
 std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
   if (count == 0) return 0;
-  sum_up(stage, values, count);
+  prefix_sums(stage, values, count);
   return values.read_one(count);
 }
 

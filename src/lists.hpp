@@ -12,7 +12,7 @@ class Lists {
   explicit Lists(Commands& commands);
 
   /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total
-  void sum_up(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
+  void prefix_sums(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
     if (count > 0) scan_level(stage, values, count, 0);
   }
 

@@ -87,7 +87,7 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // The working image and its grid - 3.1, eq. (2)-(3)
   const WorkingImage image = make_working_image(frame, config);
   frame_on_device = 0;
-  if (unfinished) {  // a frame failed half way, but may have split surfels: older changes tell of it
+  if (unfinished) {  // a frame failed half way, but may have split surfels or noted others as changed
     pages_changed = true;
     finish_frame();
     unfinished = false;

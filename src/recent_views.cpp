@@ -103,13 +103,13 @@ void RecentViews::clear(bool map_is_empty) {
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
-  const std::vector<float> depths = by_squares(image), blocks = find_block_depths(image);
+  std::vector<float> depths = by_squares(image), blocks = find_block_depths(image);
   if (depths.size() > room_pixels_ || blocks.size() > room_blocks_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
     const std::size_t most_pixels = std::max(depths.size(), room_pixels_), most_blocks = std::max(blocks.size(), room_blocks_);
+    clear(kept_.empty() && complete_);
     depths_.allocate((config_.recent_views + 1) * most_pixels);
     block_depths_.allocate((config_.recent_views + 1) * most_blocks);
-    clear(kept_.empty() && complete_);
     room_pixels_ = most_pixels;
     room_blocks_ = most_blocks;
   }
@@ -117,8 +117,8 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   for (const Kept& kept : kept_) taken[kept.room] = true;
   const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
   current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.send(depths, room * room_pixels_);
-  block_depths_.send(blocks, room * room_blocks_);
+  depths_.send(std::move(depths), room * room_pixels_);
+  block_depths_.send(std::move(blocks), room * room_blocks_);
 }
 
 View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
@@ -143,10 +143,10 @@ int RecentViews::prepare() {
     views.push_back(to_view(kept, T_view_camera));
   }
   views_.resize(std::max<std::size_t>(config_.recent_views, 1));
-  views_.send(views);
+  views_.send(std::move(views));
   view_lanes_.resize(1);
   view_lanes_.send(std::move(lanes));
-  return static_cast<int>(views.size());
+  return static_cast<int>(kept_.size());
 }
 
 bool RecentViews::adds_something() const {

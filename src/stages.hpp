@@ -15,7 +15,7 @@
 
 namespace frontier_surfels {
 
-/// CuboidPixels of 2_observed_space.
+/// CuboidPixels on the device.
 struct CuboidPixelArrays {
   explicit CuboidPixelArrays(Commands& commands) : of_layer(commands), of_run(commands), layers(commands) {}
   void write(const CuboidPixels& pixels) {
@@ -48,12 +48,13 @@ class Stages {
   void sweep_paths();                                  ///< K'
   void filter_median();                                ///< K~
   void find_candidates();                              ///< voxels for new surfels by C~
-  void mark_removed();                                 ///< surfels in observed space, to be removed; voxels of the others are no candidates
-  void settle_by_recent_views();                       ///< candidates that a kept view knows are dropped
-  void filter_candidates();                            ///< candidates without a normal are dropped
-  std::size_t remove_surfels();  ///< @return how many; device memory for what create_surfels adds is made sure of before
-  std::size_t create_surfels();  ///< @return how many
-  void label_surfels();
+  /// Notes surfels to be removed, those in observed space, and of the others those to be labelled. Voxels of the others are no candidates.
+  void mark_removed();
+  void settle_by_recent_views();  ///< candidates that a kept view knows are dropped
+  void filter_candidates();       ///< candidates without a normal are dropped
+  std::size_t remove_surfels();   ///< @return how many; device memory for what create_surfels adds is made sure of before
+  std::size_t create_surfels();   ///< @return how many
+  void label_surfels();           ///< new ones, and those that mark_removed has noted
 
   std::vector<BlockKey> finish_frame();  ///< notes what has changed in the map. @return blocks that have lost pages
 

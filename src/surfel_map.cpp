@@ -140,7 +140,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   histogram_.resize(bins + 1);
   histogram_.fill(stage, 0, bins);
   commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, histogram_());
-  lists_.sum_up(stage, histogram_, bins);
+  lists_.prefix_sums(stage, histogram_, bins);
   cell_begin_.resize(cell_count + 1);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_count, cell_begin_());
   order_.resize(count);
@@ -161,7 +161,7 @@ void SurfelMap::count_free(const char* stage) {
   free_before_.resize(window_pages() + 1);
   if (window_pages() == 0) free_before_.fill(stage, 0, 1);
   commands_.run(stage, "count_free", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), alive_(), free_before_());
-  lists_.sum_up(stage, free_before_, window_pages());
+  lists_.prefix_sums(stage, free_before_, window_pages());
 }
 
 /// @param missing  pages that each cell's block needs

@@ -37,7 +37,7 @@ __kernel void test_voxels(__global int4* out, __global const float4* in, const G
 __kernel void test_load(__global float* out, __global const uint4* in, const Window window, const Transform T, const int4 block) {
   const int n = get_global_id(0), all = LANES * get_global_size(0);
   const Surfels s = load_surfels(&window, &T, in, block, LANES * n);
-  const Points normal = surfel_normals16(&s, &T);
+  const Points normal = stored_normals(&s, &T);
   const float16 fields[9] = {s.position.x, s.position.y, s.position.z, s.radius, normal.x, normal.y, normal.z, as_float16(s.normal),
                              as_float16(s.attributes)};
   for (int field = 0; field < 9; ++field) vstore16(fields[field], 0, out + field * all + LANES * n);

@@ -118,7 +118,7 @@ struct Report {
   std::size_t device_bytes = 0;   ///< all buffers on the device, the map's included; without what a CPU's system has not given yet
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
-  std::vector<StageTime> stages;  ///< in the order of the paper; device time by OpenCL events
+  std::vector<StageTime> stages;  ///< in the order in which they run; device time by OpenCL events
 };
 
 /// Size of the map and of the memory around it.

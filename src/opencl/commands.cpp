@@ -42,14 +42,14 @@ Commands::Commands(Device device) : device_(std::move(device)) {
 
 Commands::~Commands() {
   try {
-    if (!kept_.empty()) queue_.finish();  // a frame that failed may still be reading
+    queue_.finish();  // a frame that failed may still be reading what is kept
   } catch (const cl::Error&) {
-    // Then it is not.
+    // The device is lost: nothing reads any more.
   }
 }
 
 void Commands::forget_times() {
-  if (!kept_.empty()) queue_.finish();
+  queue_.finish();
   kept_.clear();
   events_.clear();
 }

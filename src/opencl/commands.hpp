@@ -39,13 +39,14 @@ class Commands {
 
   void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }
 
-  /// Waits for all launches; device time of each stage since the last call, in the order of their first launch.
+  /// Waits for all launches, and forgets what was kept for them. Device time of each stage since the last call, in the order of their
+  /// first launch.
   std::vector<StageTime> take_times();
 
-  /// Drops the times noted so far. Waits for all launches.
+  /// The same without the times.
   void forget_times();
 
-  /// Keeps what a command reads from until all launches are done.
+  /// Keeps what a command reads from until take_times() or forget_times().
   void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
   std::size_t most_bytes() const { return most_bytes_; }  ///< that a buffer may have

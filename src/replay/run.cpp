@@ -11,6 +11,13 @@ namespace {
 
 constexpr std::size_t kSegments = 40000;  // of the exact test's completeness: standard error below 0.25 % of any share
 
+/// [ms] user and system time of this process, so far.
+double process_cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return time.tv_sec * 1e3 + time.tv_nsec / 1e6;
+}
+
 }  // namespace
 
 Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
@@ -83,12 +90,6 @@ double peak_rss_mb() {
   for (std::string word; status >> word;)
     if (word == "VmHWM:") status >> kib;
   return kib * 1024.0 / 1e6;
-}
-
-double process_cpu_ms() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return time.tv_sec * 1e3 + time.tv_nsec / 1e6;
 }
 
 Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped) {

@@ -83,9 +83,6 @@ Error nothing_usable(const Recording& recording, const std::vector<std::string>&
 /// [10^6 byte] of this process, so far.
 double peak_rss_mb();
 
-/// [ms] user and system time of this process, so far.
-double process_cpu_ms();
-
 /// Scores of a map; empty where there is no such yardstick.
 struct Scores {
   std::optional<scoring::OctomapScore> octomap;

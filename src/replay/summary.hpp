@@ -21,7 +21,7 @@ TimeStatistics time_statistics(std::vector<double> values);
 /// The frames that time figures are taken over: all but the first five, where there are more than ten.
 std::vector<FrameRecord> warm_frames(const std::vector<FrameRecord>& frames);
 
-/// Names of all stages in the paper's order, those that did not run in the first frame included.
+/// Names of all stages in the order in which they run, those that did not run in the first frame included.
 std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames);
 
 /// Times of whole frames, and mean and median of every stage [ms].

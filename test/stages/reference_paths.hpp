@@ -67,7 +67,7 @@ inline Field<char> median(const Field<char>& known, int votes) {
   return filtered;
 }
 
-/// Voxels for new surfels - eq. (13), before it is asked whether they are known: unobserved, a 6-neighbour observed, no surfel there.
+/// Voxels for new surfels - eq. (13), before it is asked whether they are known, or taken: unobserved, a 6-neighbour observed.
 inline Field<char> candidates(const Field<char>& observed) {
   Field<char> found(observed.size_i, observed.size_j, observed.size_k, 0);
   const std::array<std::array<int, 3>, 6> sides = {{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
