@@ -114,26 +114,26 @@ typedef struct {
 
 // A surfel as the view's grid sees it.
 typedef struct {
-  float i, j, k;        // grid coordinates of the centre
-  float reach;          // rho = 2 r / delta(z) [voxel]
-  float n_x, n_y, n_z;  // normal, camera frame
-  float n_k;            // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
-  float ray_x, ray_y;   // a step along k moves so many voxels in x and y
-  SHARED_UINT slot;     // in the map
-  SHARED_UINT ragged;   // 1: opens no path to known space, only closes it
+  float i, j, k;           // grid coordinates of the centre
+  float reach;             // rho = 2 r / delta(z) [voxel]
+  float n_x, n_y, n_z;     // normal, camera frame
+  float n_k;               // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
+  float ray_x, ray_y;      // a step along k moves so many voxels in x and y
+  SHARED_UINT slot;        // in the map
+  SHARED_UINT ragged;      // 1: opens no path to known space, only closes it
 } ViewSurfel;
 
 // Limits of the method, from the configuration.
 typedef struct {
   float th_d;
-  float peak;       // in steps of 1 / SIGN_FIELD_ONE
-  float thickness;  // [voxel]
+  float peak;               // in steps of 1 / SIGN_FIELD_ONE
+  float thickness;          // [voxel]
   float hull_unknown_scale;
-  float split_radius;   // surfels of this radius or more are split [voxel]
-  float create_radius;  // of a new surfel [voxel]
-  float normal_min;     // shorter sums of directions make no surfel
-  float min_gap;        // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
-  float surface_depth;  // so far behind a measured surface a surfel is occupied [m]
+  float split_radius;       // surfels of this radius or more are split [voxel]
+  float create_radius;      // of a new surfel [voxel]
+  float normal_min;         // shorter sums of directions make no surfel
+  float min_gap;            // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
+  float surface_depth;      // so far behind a measured surface a surfel is occupied [m]
   SHARED_INT median_votes;
 } Limits;
 

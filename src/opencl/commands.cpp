@@ -42,21 +42,24 @@ Commands::Commands(Device device) : device_(std::move(device)) {
 
 Commands::~Commands() {
   try {
-    queue_.finish();  // a frame that failed may still be reading what is kept
+    finish();  // a frame that failed may still be reading what is kept
   } catch (const cl::Error&) {
     // The device is lost: nothing reads any more.
   }
 }
 
-void Commands::forget_times() {
+void Commands::finish() {
   queue_.finish();
   kept_.clear();
+}
+
+void Commands::forget_times() {
+  finish();
   events_.clear();
 }
 
 std::vector<StageTime> Commands::take_times() {
-  queue_.finish();
-  kept_.clear();
+  finish();
   std::vector<StageTime> times;
   for (const auto& [stage, event] : events_) {
     auto found = std::find_if(times.begin(), times.end(), [&name = stage](const StageTime& time) { return time.name == name; });

@@ -55,6 +55,8 @@ class Commands {
   std::size_t allocated_bytes() const { return allocated_bytes_; }
 
  private:
+  void finish();  ///< waits for all launches, and drops what was kept for them
+
   Device device_;
   cl::CommandQueue queue_;
   std::map<std::string, cl::Kernel> kernels_;

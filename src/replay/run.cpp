@@ -1,22 +1,14 @@
 #include "replay/run.hpp"
 
-#include <time.h>
-
 #include <fstream>
 
 #include "replay/progress.hpp"
+#include "scoring/cpu_clock.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
 
 constexpr std::size_t kSegments = 40000;  // of the exact test's completeness: standard error below 0.25 % of any share
-
-/// [ms] user and system time of this process, so far.
-double process_cpu_ms() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return time.tv_sec * 1e3 + time.tv_nsec / 1e6;
-}
 
 }  // namespace
 
@@ -50,9 +42,9 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
   while (const auto frame = source.next()) {
     const DepthFrame view = frame->view();
     try {
-      const double cpu_before_ms = process_cpu_ms();
+      const double cpu_before_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID);
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
-      record.cpu_ms = process_cpu_ms() - cpu_before_ms;
+      record.cpu_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_before_ms;
       after_frame(view, record);
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {

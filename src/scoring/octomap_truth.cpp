@@ -1,7 +1,6 @@
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 
 #include <octomap/octomap.h>
-#include <time.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +8,7 @@
 #include <cmath>
 #include <future>
 
+#include "cpu_clock.hpp"
 #include "octomap_cloud.hpp"
 #include "surfel_tree.hpp"
 
@@ -79,10 +79,15 @@ std::size_t count_far(const std::vector<Surfel>& surfels, const SurfelTree& tree
                        [&](const Surfel& surfel) { return tree.nearest(surfel.position.cast<double>()).distance > tolerance; });
 }
 
-double thread_cpu_ms() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return time.tv_sec * 1e3 + time.tv_nsec / 1e6;
+/// What insertPointCloud takes of the calling thread.
+InsertionTime insert(OcTree& tree, const octomap::Pointcloud& cloud, const octomap::point3d& origin) {
+  const auto start = std::chrono::steady_clock::now();
+  const double cpu_before_ms = cpu_ms(CLOCK_THREAD_CPUTIME_ID);
+  // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is pruned at once, as
+  // octomap_server does.
+  tree.insertPointCloud(cloud, origin, -1, false, false);
+  return {std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
+          cpu_ms(CLOCK_THREAD_CPUTIME_ID) - cpu_before_ms};
 }
 
 }  // namespace
@@ -107,17 +112,7 @@ InsertionTime OctomapTruth::add(const DepthFrame& frame) {
   const octomap::Pointcloud cloud = to_octomap_cloud(frame, impl_->range);
   // A thread has a heap of its own. In the caller's, every allocation would search the great many small nodes that the tree has freed:
   // the mapper's frames between two insertions took 30 ms longer.
-  return std::async(std::launch::async,
-                    [&] {
-                      const auto start = std::chrono::steady_clock::now();
-                      const double cpu_before_ms = thread_cpu_ms();
-                      // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is
-                      // pruned at once, as octomap_server does.
-                      impl_->tree.insertPointCloud(cloud, octomap_origin(frame), -1, false, false);
-                      return InsertionTime{std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
-                                           thread_cpu_ms() - cpu_before_ms};
-                    })
-      .get();
+  return std::async(std::launch::async, [&] { return insert(impl_->tree, cloud, octomap_origin(frame)); }).get();
 }
 
 std::vector<Surfel> OctomapTruth::boundary() const {
