@@ -27,8 +27,8 @@ namespace frontier_surfels {
 // Side of the blocks of a view's image whose largest depth is known [pixel].
 #define VIEW_BLOCK 8
 
-// So many layers of the cuboid are looked at together when space is observed.
-#define LAYER_RUN 16
+// So many rows of the grid one work item observes.
+#define SPACE_ROWS 8
 
 // Images of views are kept in squares of VIEW_SQUARE x VIEW_SQUARE pixels, row by row, and so are the pixels of a square: one is 64 bytes.
 // Points near each other are asked for together, and a row of pixels would be of use for one of them.

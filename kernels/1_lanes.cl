@@ -61,12 +61,16 @@ INLINE int16 quotients(int16 a, int b) {
 
 INLINE float16 voxel_sizes(const Grid* g, float16 z) { return fmax(z, g->z_min) / g->f; }
 
+// Grid coordinates along k of points at depths z.
+INLINE float16 layers_at(const Grid* g, float16 z) {
+  return z < g->z_min ? z / g->delta_min + (float)g->padding_k : g->f * natural_log16(fmax(z, g->z_min) / g->z_min) + g->k_min;
+}
+
 // The voxels that points of the camera's frame lie in: F, rounded.
 INLINE Voxels voxels_at(const Grid* g, Points p) {
   const float16 depth = fmax(p.z, g->z_min);
-  const float16 layer = p.z < g->z_min ? p.z / g->delta_min + (float)g->padding_k : g->f * natural_log16(depth / g->z_min) + g->k_min;
   return (Voxels){floor_int16(p.x * g->fx / depth + g->center_i + 0.5f), floor_int16(p.y * g->fy / depth + g->center_j + 0.5f),
-                  floor_int16(layer + 0.5f)};
+                  floor_int16(layers_at(g, p.z) + 0.5f)};
 }
 
 INLINE int16 inside_grid16(const Grid* g, Voxels v) {
@@ -74,3 +78,18 @@ INLINE int16 inside_grid16(const Grid* g, Voxels v) {
 }
 
 INLINE int16 same_voxels(Voxels a, Voxels b) { return (a.i == b.i) & (a.j == b.j) & (a.k == b.k); }
+
+// A row of the grid's voxels, and of the working image's pixels, has so many chunks of LANES, and words of 32.
+INLINE int grid_chunks(int size) { return (size + LANES - 1) / LANES; }
+INLINE int image_words(const Grid* g) { return (g->width + 31) / 32; }
+
+// Stores words of LANES columns from i, those that exist.
+INLINE void store_words(ulong16 words, const Grid* g, int i, __global ulong* field) {
+  if (i + LANES <= g->size_i) {
+    vstore16(words, 0, field);
+    return;
+  }
+  ulong some[LANES];
+  vstore16(words, 0, some);
+  for (int n = 0; i + n < g->size_i; ++n) field[n] = some[n];
+}

@@ -41,36 +41,15 @@ INLINE float3 ellipsoid_extents(const ViewSurfel* s, float thickness) {
                   ellipsoid_extent(s, thickness, (float3)(0.0f, 0.0f, 1.0f)));
 }
 
-// One work item LANES surfels, one group a page of the window: which of them have an ellipsoid that may reach into the grid, generously,
-// and which must be split.
-//   in  pages[count]: those of the window;   out in_view[count], large[count];   i/o counts: COUNT_IN_VIEW, COUNT_LARGE
-__kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void mark_in_view(
-    const Grid g, const Limits limits, const Window window, const Transform T_camera_local, __global const uint* pages,
-    __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels, __global ulong* in_view,
-    __global ulong* large, __global uint* counts) {
-  __local ushort in_view_lanes[PAGE_SLOTS / LANES], large_lanes[PAGE_SLOTS / LANES];
-  const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
-  in_view_lanes[item] = large_lanes[item] = 0;
-  if (lanes_of_page(alive[page], first) != 0) {
-    const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
-    const Points p = s.position;
-    const float16 voxel = voxel_sizes(&g, p.z), slope = 1.0f / fmax(p.z, g.z_min);
-    const float16 reach = fmax(2.0f * s.radius / voxel, limits.thickness) + 1.5f;
-    const float16 i = p.x * slope * g.fx + g.center_i, j = p.y * slope * g.fy + g.center_j;
-    const float16 reach_i = reach * (1.0f + fabs(p.x * slope)), reach_j = reach * (1.0f + fabs(p.y * slope));
-    in_view_lanes[item] =
-        (ushort)lane_bits((p.z >= -((float)g.padding_k + reach) * voxel) & (p.z <= g.z_max + 2.0f * reach * voxel) & (i > -reach_i) &
-                          (i < (float)g.size_i + reach_i) & (j > -reach_j) & (j < (float)g.size_j + reach_j));
-    const int16 large_ones = s.radius / voxel >= limits.split_radius;
-    if (lane_bits(large_ones) != 0) large_lanes[item] = (ushort)lane_bits(large_ones & inside_grid16(&g, voxels_at(&g, p)));
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (item > 0) return;
-  const ulong in_view_here = alive[page] & pack_lanes(in_view_lanes), large_here = alive[page] & pack_lanes(large_lanes);
-  in_view[get_group_id(0)] = in_view_here;
-  large[get_group_id(0)] = large_here;
-  if (in_view_here != 0) atomic_add(&counts[COUNT_IN_VIEW], (uint)popcount(in_view_here));
-  if (large_here != 0) atomic_add(&counts[COUNT_LARGE], (uint)popcount(large_here));
+// Which of LANES surfels have an ellipsoid that may reach into the grid, generously.
+INLINE int16 reach_grid(const Grid* g, const Limits* limits, const Surfels* s, float16 voxel) {
+  const Points p = s->position;
+  const float16 slope = 1.0f / fmax(p.z, g->z_min);
+  const float16 reach = fmax(2.0f * s->radius / voxel, limits->thickness) + 1.5f;
+  const float16 i = p.x * slope * g->fx + g->center_i, j = p.y * slope * g->fy + g->center_j;
+  const float16 reach_i = reach * (1.0f + fabs(p.x * slope)), reach_j = reach * (1.0f + fabs(p.y * slope));
+  return (p.z >= -((float)g->padding_k + reach) * voxel) & (p.z <= g->z_max + 2.0f * reach * voxel) & (i > -reach_i) &
+         (i < (float)g->size_i + reach_i) & (j > -reach_j) & (j < (float)g->size_j + reach_j);
 }
 
 // How many times a large surfel must be halved until it is small enough.

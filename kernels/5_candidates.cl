@@ -79,19 +79,20 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
   vstore16(sum.z, 3 * chunk + 2, directions);
 }
 
-// One work item a word, dimensions i, w and j.
-//   in  observed: C~;   out candidates: also those that surviving surfels take; 4_removal knows them
+// One work item words of LANES columns.
+//   in  observed: C~, with LANES words to spare;   out candidates: also those that surviving surfels take; 4_removal knows them
 __kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates) {
-  const int i = get_global_id(0), w = get_global_id(1), j = get_global_id(2);
-  if (i >= g.size_i) return;
-  const int word = word_index(&g, i, j, w);
-  const ulong here = observed[word];
-  ulong beside = (here << 1) | (here >> 1);
-  if (w > 0) beside |= observed[word_index(&g, i, j, w - 1)] >> 63;
-  if (w + 1 < g.words_k) beside |= observed[word_index(&g, i, j, w + 1)] << 63;
-  if (i > 0) beside |= observed[word - 1];
-  if (i + 1 < g.size_i) beside |= observed[word + 1];
-  if (j > 0) beside |= observed[word_index(&g, i, j - 1, w)];
-  if (j + 1 < g.size_j) beside |= observed[word_index(&g, i, j + 1, w)];
-  candidates[word] = beside & ~here & valid_layers(&g, w);
+  const int chunks = grid_chunks(g.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % g.words_k,
+            j = get_global_id(0) / chunks / g.words_k;
+  if (j >= g.size_j) return;
+  __global const ulong* own = observed + word_index(&g, i, j, w);
+  const ulong16 here = vload16(0, own);
+  const int16 has_right = i + lane_numbers() + 1 < g.size_i;
+  const ulong16 left = i > 0 ? vload16(0, own - 1) : (ulong16)(0, here.s0123, here.s4567, here.s89ab, here.scd, here.se);
+  ulong16 beside = here << 1 | here >> 1 | left | (vload16(0, own + 1) & as_ulong16(convert_long16(has_right)));
+  if (w > 0) beside |= vload16(0, own - g.size_i) >> 63;
+  if (w + 1 < g.words_k) beside |= vload16(0, own + g.size_i) << 63;
+  if (j > 0) beside |= vload16(0, own - g.words_k * g.size_i);
+  if (j + 1 < g.size_j) beside |= vload16(0, own + g.words_k * g.size_i);
+  store_words(beside & ~here & valid_layers(&g, w), &g, i, candidates + word_index(&g, i, j, w));
 }

@@ -100,15 +100,13 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // Observed space C~ - 3.3, eq. (9)-(11)
   stages.observe_space();
 
-  // Surfels in view, split where they are large for this view - 3.4
-  report.in_view = stages.select_in_view();
-  report.split = stages.split_surfels();
-
   // Candidates for creation - 3.5, eq. (13)
   stages.find_candidates();
 
-  // Removal - 3.4, eq. (12): decided now, done when the frame can no longer fail. Voxels of surfels that stay are no candidates
-  stages.mark_removed();
+  // Surfels in view, split where they are large for this view - 3.4 -, and removal - eq. (12): decided now, done when the frame can no
+  // longer fail. Voxels of surfels that stay are no candidates
+  report.in_view = stages.select_in_view();
+  report.split = stages.split_surfels();
 
   // Candidates that a recent view knows are none
   stages.settle_by_recent_views();

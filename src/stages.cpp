@@ -42,11 +42,12 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       limits_(make_limits(config)),
       depth_(commands),
       layer_depth_(commands),
-      valid_above_(commands),
       column_end_(commands),
       color_(commands),
-      columns_(commands),
-      rows_(commands),
+      valid_(commands),
+      pixels_i_(commands),
+      pixels_j_(commands),
+      words_i_(commands),
       observed_(commands),
       events_(commands),
       hull_(commands),
@@ -89,7 +90,6 @@ void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_w
   T_camera_local_ = to_transform(map_.window().T_camera_local());
   T_local_camera_ = to_transform(map_.window().T_camera_local().inverse());
   depth_.send(image.depth);
-  valid_above_.send(image.valid_above);
   has_color_ = !image.color.empty();
   color_.resize(1);
   color_.send(image.color);
@@ -101,15 +101,17 @@ void Stages::set_grid(const WorkingImage& image) {
   grid_ = view.grid;
   intrinsics_ = {};  // until all of it is there
   layer_depth_.write(view.layer_depth);
-  columns_.write(view.columns);
-  rows_.write(view.rows);
+  pixels_i_.write(view.pixels_i);
+  pixels_j_.write(view.pixels_j);
+  words_i_.write(view.words_i);
   column_end_.resize(image.depth.size());
+  valid_.resize(image_chunks());
   allocate_grid();
   intrinsics_ = image.intrinsics;
 }
 
 void Stages::allocate_grid() {
-  observed_.allocate(words());
+  observed_.allocate(words() + LANES);  // vectors are read beyond the last row's end
   filtered_.allocate(words());
   candidates_.allocate(words());
 }
@@ -124,31 +126,32 @@ void Stages::allocate_paths() {
   hull_.allocate(2 * (j * w + i * w + i * j));
 }
 
-cl::NDRange Stages::word_range() const {
-  return {(grid_.size_i + kGroup - 1) / kGroup * kGroup, static_cast<std::size_t>(grid_.words_k), static_cast<std::size_t>(grid_.size_j)};
-}
+std::size_t Stages::image_chunks() const { return 2 * ((grid_.width + 31) / 32) * static_cast<std::size_t>(grid_.height); }
 
 void Stages::observe_space() {
   const char* stage = "observed_space";
-  commands_.run(stage, "column_ends", static_cast<std::size_t>(grid_.width) * grid_.height, kGroup, grid_, depth_(), layer_depth_(),
-                column_end_());
-  commands_.run(stage, "observed_space", word_range(), cl::NDRange(kGroup, 1, 1), grid_, column_end_(), valid_above_(), columns_.of_layer(),
-                rows_.of_layer(), columns_.of_run(), rows_.of_run(), columns_.layers(), rows_.layers(), observed_());
+  commands_.run(stage, "column_ends", image_chunks(), kGroup, grid_, depth_(), layer_depth_(), column_end_(), valid_());
+  const std::size_t rows = (grid_.size_j + SPACE_ROWS - 1) / SPACE_ROWS;
+  commands_.run(stage, "observed_space", chunks(grid_.size_i) * grid_.words_k * rows, large_group(), grid_, column_end_(), valid_(),
+                pixels_i_(), pixels_j_(), words_i_(), observed_());
 }
 
-void Stages::mark_in_view() {
+void Stages::visit_surfels() {
   const char* stage = "in_view";
   const std::size_t pages = map_.window_pages();
   in_view_bits_.resize(pages + 1);
   large_bits_.resize(pages + 1);
+  removed_bits_.resize(pages + 1);
   counts_.resize(COUNTS);
   counts_.fill(stage, 0, COUNTS);
-  commands_.run(stage, "mark_in_view", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, map_.pages(),
-                map_.alive(), map_.page_block(), map_.surfels(), in_view_bits_(), large_bits_(), counts_());
+  commands_.run(stage, "visit_surfels", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, views_.own_view(),
+                static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
+                map_.pages(), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(), map_.changed(), in_view_bits_(),
+                large_bits_(), removed_bits_(), counts_());
 }
 
 std::size_t Stages::select_in_view() {
-  mark_in_view();
+  visit_surfels();
   const std::vector<cl_uint> counts = counts_.read(COUNTS);
   large_ = counts[COUNT_LARGE];
   return counts[COUNT_IN_VIEW];
@@ -170,7 +173,8 @@ std::size_t Stages::split_surfels() {
                 split_slots_(), parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
   map_.removed(parents);
   map_.insert(stage, new_surfels_, new_cells_, children);
-  mark_in_view();  // the children instead of their parents
+  find_candidates();  // parents have taken some off
+  visit_surfels();    // the children instead of their parents
   return children - parents;
 }
 
@@ -226,18 +230,9 @@ void Stages::sweep_paths() {
 
 void Stages::filter_median() { commands_.run("median", "median", words(), kGroup, grid_, limits_, known_(), candidates_(), filtered_()); }
 
-void Stages::mark_removed() {
-  const char* stage = "removal";
-  const std::size_t pages = map_.window_pages();
-  removed_bits_.resize(pages + 1);
-  commands_.run(stage, "mark_removed", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, views_.own_view(),
-                static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
-                map_.pages(), in_view_bits_(), map_.page_block(), map_.surfels(), observed_(), candidates_(), map_.changed(),
-                removed_bits_());
-}
-
 void Stages::find_candidates() {
-  commands_.run("candidates", "find_candidates", word_range(), cl::NDRange(kGroup, 1, 1), grid_, observed_(), candidates_());
+  commands_.run("candidates", "find_candidates", chunks(grid_.size_i) * grid_.words_k * grid_.size_j, kGroup, grid_, observed_(),
+                candidates_());
 }
 
 void Stages::settle_by_recent_views() {

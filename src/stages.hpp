@@ -15,19 +15,6 @@
 
 namespace frontier_surfels {
 
-/// CuboidPixels on the device.
-struct CuboidPixelArrays {
-  explicit CuboidPixelArrays(Commands& commands) : of_layer(commands), of_run(commands), layers(commands) {}
-  void write(const CuboidPixels& pixels) {
-    of_layer.write(pixels.of_layer);
-    of_run.write(pixels.of_run);
-    layers.write(pixels.layers);
-  }
-
-  DeviceArray<PixelRange> of_layer, of_run;
-  DeviceArray<cl_ulong> layers;
-};
-
 class Stages {
  public:
   Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap& map, RecentViews& views);
@@ -38,8 +25,11 @@ class Stages {
   /// Sends a frame's image and, where the camera has changed, its grid. @param frame  number that changed surfels get
   void begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
 
-  void observe_space();                                ///< C~
-  std::size_t select_in_view();                        ///< @return surfels that touch the grid
+  void observe_space();    ///< C~
+  void find_candidates();  ///< voxels for new surfels by C~
+  /// Notes which surfels must be split, removed, those in observed space, and of the others labelled. Voxels of these are no candidates.
+  /// @return surfels that touch the grid
+  std::size_t select_in_view();
   std::size_t split_surfels();                         ///< @return surfels that this adds to the map
   bool is_open() const { return !views_.complete(); }  ///< whether section 4 has anything left to decide
   void assume_unknown();                               ///< K~ = 0: what the recent views did not see is unknown
@@ -47,14 +37,11 @@ class Stages {
   void compute_known_hull();                           ///< states in which paths enter the grid
   void sweep_paths();                                  ///< K'
   void filter_median();                                ///< K~
-  void find_candidates();                              ///< voxels for new surfels by C~
-  /// Notes surfels to be removed, those in observed space, and of the others those to be labelled. Voxels of the others are no candidates.
-  void mark_removed();
-  void settle_by_recent_views();  ///< candidates that a kept view knows are dropped
-  void filter_candidates();       ///< candidates without a normal are dropped
-  std::size_t remove_surfels();   ///< @return how many; device memory for what create_surfels adds is made sure of before
-  std::size_t create_surfels();   ///< @return how many
-  void label_surfels();           ///< new ones, and those that mark_removed has noted
+  void settle_by_recent_views();                       ///< candidates that a kept view knows are dropped
+  void filter_candidates();                            ///< candidates without a normal are dropped
+  std::size_t remove_surfels();  ///< @return how many; device memory for what create_surfels adds is made sure of before
+  std::size_t create_surfels();  ///< @return how many
+  void label_surfels();          ///< new ones, and those that select_in_view has noted
 
   std::vector<BlockKey> finish_frame();  ///< notes what has changed in the map. @return blocks that have lost pages
 
@@ -66,14 +53,14 @@ class Stages {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
-  void mark_in_view();
+  void visit_surfels();
   void place_surfels();
   void list_candidates();  ///< and the direction to the observed space around each
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   void allocate_paths();
-  cl::NDRange word_range() const;   ///< a work item for each word, by i, w and j
-  std::size_t large_group() const;  ///< work items of a group where one item has much to do
+  std::size_t image_chunks() const;  ///< LANES pixels of a row each, an even number of them
+  std::size_t large_group() const;   ///< work items of a group where one item has much to do
 
   Commands& commands_;
   Lists& lists_;
@@ -93,9 +80,10 @@ class Stages {
 
   // Image and grid
   DeviceArray<float> depth_, layer_depth_;
-  DeviceArray<cl_int> valid_above_, column_end_;
+  DeviceArray<cl_int> column_end_;
   DeviceArray<cl_uint> color_;
-  CuboidPixelArrays columns_, rows_;
+  DeviceArray<cl_ushort> valid_;
+  DeviceArray<PixelRange> pixels_i_, pixels_j_, words_i_;
 
   // Bit fields
   DeviceArray<cl_ulong> observed_, events_, hull_, known_, filtered_, candidates_;

@@ -25,26 +25,23 @@ void set_footprints(const Axis& axis, int k, PixelRange* ranges) {
   }
 }
 
-void include(PixelRange& range, const PixelRange& other) {
-  range = range[0] == range[1] ? other : PixelRange{std::min(range[0], other[0]), std::max(range[1], other[1])};
+std::vector<PixelRange> find_pixels(const Axis& axis) {
+  const std::size_t layers = (axis.layers_k + 63) / 64 * 64, size = (axis.size + LANES - 1) / LANES * LANES;
+  std::vector<PixelRange> pixels(layers * size, PixelRange{0, 0});
+  for (int k = axis.padding_k; k < axis.layers_k; ++k) set_footprints(axis, k, &pixels[k * size]);
+  return pixels;
 }
 
-CuboidPixels find_cuboid_pixels(const Axis& axis) {
-  const std::size_t words = (axis.layers_k + 63) / 64, size = axis.size;
-  CuboidPixels cuboid;
-  cuboid.of_layer.resize(64 * words * size, PixelRange{0, 0});
-  cuboid.of_run.resize(64 / LAYER_RUN * words * size, PixelRange{0, 0});
-  cuboid.layers.resize(words * size, 0);
-  for (int k = axis.padding_k; k < axis.layers_k; ++k) {
-    PixelRange* ranges = &cuboid.of_layer[k * size];
-    set_footprints(axis, k, ranges);
-    for (std::size_t voxel = 0; voxel < size; ++voxel) {
-      if (ranges[voxel][0] == ranges[voxel][1]) continue;
-      include(cuboid.of_run[k / LAYER_RUN * size + voxel], ranges[voxel]);
-      cuboid.layers[k / 64 * size + voxel] |= std::uint64_t{1} << k % 64;
-    }
+/// The words of 32 pixels that each chunk's pixels lie in.
+std::vector<PixelRange> find_words(const std::vector<PixelRange>& pixels) {
+  std::vector<PixelRange> words(pixels.size() / LANES, PixelRange{0, 0});
+  for (std::size_t n = 0; n < pixels.size(); ++n) {
+    if (pixels[n][0] == pixels[n][1]) continue;
+    PixelRange& range = words[n / LANES];
+    if (range[0] == range[1]) range[0] = pixels[n][0] / 32;
+    range[1] = static_cast<std::uint16_t>((pixels[n][1] + 31) / 32);
   }
-  return cuboid;
+  return words;
 }
 
 }  // namespace
@@ -85,8 +82,9 @@ ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
     view.layer_depth.push_back(static_cast<float>(z));
   }
   const int padding_k = config.padding_k, layers_k = g.first_pyramid_layer;
-  view.columns = find_cuboid_pixels({g.size_i, g.width, camera.cx, f, padding_k, layers_k, camera.cx + config.padding_i});
-  view.rows = find_cuboid_pixels({g.size_j, g.height, camera.cy, f, padding_k, layers_k, camera.cy + config.padding_j});
+  view.pixels_i = find_pixels({g.size_i, g.width, camera.cx, f, padding_k, layers_k, camera.cx + config.padding_i});
+  view.pixels_j = find_pixels({g.size_j, g.height, camera.cy, f, padding_k, layers_k, camera.cy + config.padding_j});
+  view.words_i = find_words(view.pixels_i);
   return view;
 }
 

@@ -14,18 +14,14 @@ namespace frontier_surfels {
 /// First and one past the last pixel of a row or column.
 using PixelRange = std::array<std::uint16_t, 2>;
 
-/// Pixels whose samples of the cuboid's layers lie in each voxel along an axis; layers are filled up to whole words of the bit fields.
-struct CuboidPixels {
-  std::vector<PixelRange> of_layer;   ///< [layers][size]: empty where there are none
-  std::vector<PixelRange> of_run;     ///< [layers / LAYER_RUN][size]: the smallest range around those of the run
-  std::vector<std::uint64_t> layers;  ///< [layers / 64][size]: bits of the layers that have any
-};
-
+/// pixels: of the working image, those whose samples of the cuboid's layers lie in each voxel along an axis; empty where there are none.
+/// Layers are filled up to whole words of the bit fields, and voxels to whole chunks of LANES.
 struct ViewGrid {
   Grid grid = {};
-  std::vector<float> layer_depth;  ///< [size_k]: z of each layer's centre [m]
-  CuboidPixels columns;            ///< of the working image, where its samples lie along i
-  CuboidPixels rows;               ///< along j
+  std::vector<float> layer_depth;    ///< [size_k]: z of each layer's centre [m]
+  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][LANES]: columns
+  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][LANES]: rows
+  std::vector<PixelRange> words_i;   ///< [layers][chunks]: words of 32 pixels that the columns of a chunk lie in
 };
 
 /// @param intrinsics  of the working image

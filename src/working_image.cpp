@@ -99,16 +99,8 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
   WorkingImage image;
   image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
   image.depth.resize(static_cast<std::size_t>(width) * height);
-  image.valid_above.assign(static_cast<std::size_t>(width + 1) * (height + 1), 0);
-  for (int t = 0; t < height; ++t) {
-    std::int32_t valid_in_row = 0;
-    for (int s = 0; s < width; ++s) {
-      const float d = interpret(read_depth(frame.depth, s * step, t * step), config);
-      image.depth[t * width + s] = d;
-      valid_in_row += d != 0;
-      image.valid_above[(t + 1) * (width + 1) + s + 1] = image.valid_above[t * (width + 1) + s + 1] + valid_in_row;
-    }
-  }
+  for (int t = 0; t < height; ++t)
+    for (int s = 0; s < width; ++s) image.depth[t * width + s] = interpret(read_depth(frame.depth, s * step, t * step), config);
   if (frame.color) {
     image.color.reserve(image.depth.size());
     for (int t = 0; t < height; ++t)

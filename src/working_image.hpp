@@ -10,10 +10,9 @@
 namespace frontier_surfels {
 
 struct WorkingImage {
-  Intrinsics intrinsics;                  ///< of the decimated image
-  std::vector<float> depth;               ///< depth[height][width] [m]: > 0 surface, < 0 nothing up to -depth, 0 no measurement
-  std::vector<std::int32_t> valid_above;  ///< [height + 1][width + 1]: pixels != 0 above and to the left
-  std::vector<std::uint32_t> color;       ///< [height][width]: red | green << 8 | blue << 16; empty if the frame has none
+  Intrinsics intrinsics;             ///< of the decimated image
+  std::vector<float> depth;          ///< depth[height][width] [m]: > 0 surface, < 0 nothing up to -depth, 0 no measurement
+  std::vector<std::uint32_t> color;  ///< [height][width]: red | green << 8 | blue << 16; empty if the frame has none
 };
 
 /// Every decimation-th pixel of both directions, nearest neighbour; intrinsics divided alike.

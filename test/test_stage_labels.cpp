@@ -98,8 +98,7 @@ std::size_t check(Camera camera, Content content, int count, bool with_color, do
     probe.change_all();
   } else {
     probe.stages().find_candidates();
-    probe.stages().select_in_view();
-    probe.stages().mark_removed();  // says which of those that stay are to be labelled
+    probe.stages().select_in_view();  // says which of those that stay are to be labelled
     removed = probe.stages().remove_surfels();
   }
   probe.stages().label_surfels();

@@ -72,14 +72,13 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   const std::vector<Surfel> map = probe.map().download();
   if (count > 10) probe.kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
   probe.stages().begin_frame(view.image, view.T_world_camera, 2);
-  probe.stages().select_in_view();
-  EXPECT_EQ(probe.stages().split_surfels(), 0u);
   const Field<char> observed = random_field(probe.grid(), density, random);
   probe.set_observed(observed);
   const Field<char> candidates = random_field(probe.grid(), 0.5, random);
   probe.set_candidates(candidates);
 
-  probe.stages().mark_removed();
+  probe.stages().select_in_view();
+  EXPECT_EQ(probe.stages().split_surfels(), 0u);
   const Expected expected = expect_removal(grid, camera.config, view, map, probe.place_surfels(), observed, candidates);
   const std::vector<std::uint64_t> in_view_words = probe.in_view_words(), removed_words = probe.removed_words();
   for (std::size_t n = 0; n < in_view_words.size(); ++n) EXPECT_EQ(removed_words[n] & ~in_view_words[n], 0u) << "others are removed";
@@ -140,7 +139,8 @@ TEST(StageRemoval, FreesSlots) {
     StagesProbe probe(camera.config);
     probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), count, 2, 2, random), 1);
     if (count > 64) probe.kill(some_slots(probe.map().download(), 20));
-    probe.stages().begin_frame(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity(), 9);
+    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 9);
+    probe.stages().observe_space();  // nothing: no surfel is at a surface
     probe.stages().select_in_view();
     probe.stages().split_surfels();
     std::map<std::uint32_t, Surfel> expected;

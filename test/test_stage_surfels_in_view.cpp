@@ -60,6 +60,7 @@ struct Scene {
       if (slot / PAGE_SLOTS % 4 != 3 && random.chance(0.1)) dead.push_back(slot);  // full pages stay
     probe.kill(dead);
     probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 7);
+    probe.stages().observe_space();  // nothing: no surfel is at a surface
   }
   SeenSurfel seen(const Surfel& surfel) const { return see(grid, T_world_camera.inverse(), surfel); }
 };

@@ -85,19 +85,6 @@ inline std::vector<Camera> cameras() {
 
 enum class Content { mixed, all_valid, all_invalid };
 
-/// The summed area table, by its definition.
-inline void count_valid_above(WorkingImage& image) {
-  const int width = image.intrinsics.width, height = image.intrinsics.height;
-  image.valid_above.clear();
-  for (int t = 0; t <= height; ++t)
-    for (int s = 0; s <= width; ++s) {
-      std::int32_t valid = 0;
-      for (int above = 0; above < t; ++above)
-        for (int left = 0; left < s; ++left) valid += image.depth[above * width + left] != 0;
-      image.valid_above.push_back(valid);
-    }
-}
-
 /// Depths between z_min and z_max with, in the mixed ones, holes and rays that met nothing up to z_max (negative).
 inline WorkingImage random_image(const Camera& camera, Content content, Random& random) {
   WorkingImage image;
@@ -111,7 +98,6 @@ inline WorkingImage random_image(const Camera& camera, Content content, Random& 
     if (content == Content::mixed && random.chance(0.4)) d = 0;
     image.depth.push_back(content == Content::all_invalid ? 0 : static_cast<float>(d));
   }
-  count_valid_above(image);
   return image;
 }
 
