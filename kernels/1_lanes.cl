@@ -29,14 +29,14 @@ typedef struct {
   int16 i, j, k;
 } Voxels;
 
-INLINE Points transform_points(const Transform* T, Points p) {
-  return (Points){T->r00 * p.x + T->r01 * p.y + T->r02 * p.z + T->t0, T->r10 * p.x + T->r11 * p.y + T->r12 * p.z + T->t1,
-                  T->r20 * p.x + T->r21 * p.y + T->r22 * p.z + T->t2};
+INLINE Points rotate_points(const Transform* T, Points p) {
+  return (Points){fma(p.x, T->r00, fma(p.y, T->r01, p.z * T->r02)), fma(p.x, T->r10, fma(p.y, T->r11, p.z * T->r12)),
+                  fma(p.x, T->r20, fma(p.y, T->r21, p.z * T->r22))};
 }
 
-INLINE Points rotate_points(const Transform* T, Points p) {
-  return (Points){T->r00 * p.x + T->r01 * p.y + T->r02 * p.z, T->r10 * p.x + T->r11 * p.y + T->r12 * p.z,
-                  T->r20 * p.x + T->r21 * p.y + T->r22 * p.z};
+INLINE Points transform_points(const Transform* T, Points p) {
+  return (Points){fma(p.x, T->r00, fma(p.y, T->r01, fma(p.z, T->r02, T->t0))), fma(p.x, T->r10, fma(p.y, T->r11, fma(p.z, T->r12, T->t1))),
+                  fma(p.x, T->r20, fma(p.y, T->r21, fma(p.z, T->r22, T->t2)))};
 }
 
 INLINE Points add_scaled(Points p, float16 scale, Points direction) {

@@ -104,15 +104,26 @@ INLINE uint16 view_pixels(const View* view, uint16 column, uint16 row) {
   return (square * VIEW_SQUARE + row % VIEW_SQUARE) * VIEW_SQUARE + column % VIEW_SQUARE;
 }
 
-// Exact membership of points in the space that one view has seen (its pixel there is valid and lies deeper), of those that are asked.
-//   depths: all views' images, without signs;  p: in this frame's camera [m]
-INLINE int16 knows(const View* view, __global const float* depths, Points p, int16 asked) {
-  const Points q = transform_points(&view->to_image, p);
+// Which of LANES points does a view see: its pixel there is valid and lies deeper?
+//   q: column and row times depth, and depth (View)
+INLINE int16 sees(const View* view, __global const float* depths, Points q, int16 asked) {
   const float16 scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
   const int16 seen = asked & (q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
   if (lane_bits(seen) == 0) return 0;
   const uint16 pixel = view_pixels(view, convert_uint16(s), convert_uint16(t));
   return seen & (q.z < gather(depths + view->first_pixel, seen ? as_int16(pixel) : 0));
+}
+
+// Exact membership of points in the space that one view has seen, of those that are asked.
+//   depths: all views' images, without signs;  p: in this frame's camera [m]
+INLINE int16 knows(const View* view, __global const float* depths, Points p, int16 asked) {
+  return sees(view, depths, transform_points(&view->to_image, p), asked);
+}
+
+// The same of this frame's own view, whose camera has no other orientation.
+INLINE int16 own_view_knows(const View* view, __global const float* depths, Points p, int16 asked) {
+  const Transform* K = &view->to_image;
+  return sees(view, depths, (Points){fma(p.x, K->r00, p.z * K->r02), fma(p.y, K->r11, p.z * K->r12), p.z}, asked);
 }
 
 // Are points in these voxels, at depths z, at the measured surface that ended their pixel's column, or at most `surface_depth` behind it?

@@ -6,10 +6,10 @@
 INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, __global const float* depths, const Surfels* s,
                     Points normal, int16 inside) {
   int16 gone = 0;
-  if (remove_buried) gone |= knows(view, depths, add_scaled(s->position, -0.25f * s->radius, normal), inside);
+  if (remove_buried) gone |= own_view_knows(view, depths, add_scaled(s->position, -0.25f * s->radius, normal), inside);
   if (limits->min_gap > 0.0f)
-    gone |=
-        knows(view, depths, add_scaled(s->position, -limits->min_gap, normal), inside & ~gone & ((s->attributes & SURFEL_OCCUPIED) == 0));
+    gone |= own_view_knows(view, depths, add_scaled(s->position, -limits->min_gap, normal),
+                           inside & ~gone & ((s->attributes & SURFEL_OCCUPIED) == 0));
   return gone;
 }
 

@@ -314,7 +314,7 @@ __kernel void close_gaps(const Grid g, const Limits limits, const View view, __g
   const int16 asked = open;
   if (lane_bits(open) == 0) return;
   const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
-  open &= ~knows(&view, depths, behind, open);
+  open &= ~own_view_knows(&view, depths, behind, open);
   const ViewsAround around = views_around(&g, views, tile_views, view_groups, v);
   open &= ~any_view_knows(&around, depths, behind, open);
   int closed[LANES];

@@ -19,9 +19,20 @@ Eigen::Vector4d border_slopes(const Grid& g) {
 /// Depth at which the grid ends [m].
 double far_end(const Grid& g) { return g.z_min * std::exp((g.size_k - g.k_min) / g.f); }
 
-/// Is a ball outside the plane through the camera with this slope? @param side  1: the grid lies above the slope, -1: below
-bool beyond(double x, double z, double slope, double side, double radius) {
-  return side * (x - slope * z) < -radius * std::sqrt(1 + slope * slope);
+/// An axis of the grid's cross-section.
+struct Axis {
+  double f, center, size;  ///< [pixel], [voxel], [voxel]
+};
+
+/// Is no surfel of a box in view along an axis? Where i = f x / m + center is a surfel's place, m being its depth but at least z_min, it is
+/// beside the grid if i <= -reach (1 + |x| / m), or as far beyond the other end. Times m both are half spaces, or two, before m >= z_min.
+/// @param x, z  of the box's corners, camera frame [m];  reach  the largest of a surfel there [voxel]
+bool is_beside(const Axis& axis, const Eigen::Array<double, 8, 1>& x, const Eigen::Array<double, 8, 1>& z, double z_min, double reach) {
+  const Eigen::Array<double, 8, 1> m = z.max(z_min), at = axis.f * x + axis.center * m, beyond = reach * (m + x.abs());
+  const bool bent = z.minCoeff() < z_min;  // then only a border that bends outwards bounds what is convex
+  const bool low = (at <= -beyond).all() && (!bent || axis.center + reach >= 0),
+             high = (at - axis.size * m >= beyond).all() && (!bent || axis.size + reach - axis.center >= 0);
+  return low || high;
 }
 
 }  // namespace
@@ -37,10 +48,9 @@ double block_size_for(double z_max) {
   return size;
 }
 
-MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin) : grid_(grid) {
-  z_far_ = far_end(grid);
-  sphere_ = block_size * std::sqrt(3.0) / 2 + margin;
-
+MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin,
+                     const SurfelExtent& extent)
+    : grid_(grid), extent_(extent), z_far_(far_end(grid)) {
   // Between the grid's two ends its cross-section lies within that of their convex hull.
   const Eigen::Vector4d slopes = border_slopes(grid);
   Eigen::AlignedBox3d box;
@@ -74,14 +84,17 @@ Eigen::Vector3d MapWindow::corner(const BlockKey& block) const {
 }
 
 bool MapWindow::meets_grid(const BlockKey& block) const {
-  const Eigen::Vector3d p = T_camera_local_ * (corner(block) + Eigen::Vector3d::Constant(window_.block_size / 2));
-  if (p.z() < -(grid_.padding_k + 0.5) * grid_.delta_min - sphere_ || p.z() > z_far_ + sphere_) return false;
-  const Eigen::Vector4d slopes = border_slopes(grid_);
-  const bool in_pyramid = !beyond(p.x(), p.z(), slopes[0], 1, sphere_) && !beyond(p.x(), p.z(), slopes[1], -1, sphere_) &&
-                          !beyond(p.y(), p.z(), slopes[2], 1, sphere_) && !beyond(p.y(), p.z(), slopes[3], -1, sphere_);
-  if (in_pyramid || p.z() > grid_.z_min + sphere_) return in_pyramid;
-  const Eigen::Vector4d sides = slopes * grid_.z_min;  // of the cuboid before the pyramid
-  return p.x() > sides[0] - sphere_ && p.x() < sides[1] + sphere_ && p.y() > sides[2] - sphere_ && p.y() < sides[3] + sphere_;
+  Eigen::Array<double, 8, 3> p;  // the block's corners, camera frame
+  for (int n = 0; n < 8; ++n)
+    p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
+  const auto x = p.col(0), y = p.col(1), z = p.col(2);
+  const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
+  const double reach = std::max(2 * extent_.largest_radius / voxel_low, extent_.thickness) + 1.6;  // [voxel]; a tenth for rounding
+  if (z.maxCoeff() < -(grid_.padding_k + reach) * grid_.delta_min) return false;
+  // Surfels reach the further, the deeper they are, but not as fast as depth grows.
+  if (2 * (extent_.thickness + 1.6) < grid_.f && z.minCoeff() > std::max<double>(grid_.z_max, z_far_) + 2 * reach * voxel_low) return false;
+  return !is_beside({grid_.fx, grid_.center_i, double(grid_.size_i)}, x, z, grid_.z_min, reach) &&
+         !is_beside({grid_.fy, grid_.center_j, double(grid_.size_j)}, y, z, grid_.z_min, reach);
 }
 
 std::vector<BlockKey> MapWindow::blocks_near(double distance, std::size_t most) const {

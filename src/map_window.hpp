@@ -9,20 +9,26 @@
 
 namespace frontier_surfels {
 
+/// How large the map's surfels are.
+struct SurfelExtent {
+  double largest_radius = 0;  ///< [m]
+  double thickness = 0;       ///< of their ellipsoids [voxel]
+};
+
 class MapWindow {
  public:
   MapWindow() = default;
 
   /// @param margin  how far surfels beyond the grid may reach into it [m]
   /// @throws BadFrame  the grid is absurdly large for its range
-  MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin);
+  MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin, const SurfelExtent& extent);
 
   const Window& window() const { return window_; }
   const Eigen::Isometry3d& T_camera_local() const { return T_camera_local_; }
   int cells() const { return window_.size_x * window_.size_y * window_.size_z; }
   BlockKey block(int cell) const;
 
-  /// Could a surfel of this block reach into the grid? Generous.
+  /// Could a surfel of this block be in view? As generous as kernels/3_surfels_in_view.cl is with each of them.
   bool meets_grid(const BlockKey& block) const;
 
   /// All blocks, be there surfels or not, within `distance` [m] of the window; none if they are more than `most`.
@@ -37,8 +43,8 @@ class MapWindow {
   Grid grid_ = {};
   Window window_ = {};
   Eigen::Isometry3d T_camera_local_ = Eigen::Isometry3d::Identity();  ///< of an empty window only
-  double sphere_ = 0;                                                 ///< radius of a ball around a block and its surfels' reach [m]
-  double z_far_ = 0;                                                  ///< depth at which the grid ends [m]
+  SurfelExtent extent_;
+  double z_far_ = 0;  ///< depth at which the grid ends [m]
 };
 
 /// Largest distance between the camera and a point of its grid [m].

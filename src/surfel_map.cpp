@@ -78,13 +78,14 @@ double SurfelMap::window_margin(const Grid& grid) const {
 
 double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const {
   const double margin = window_margin(grid);
-  const MapWindow window(grid, T_world_camera, block_size_, margin);  // refuses what is absurd
-  return grid_reach(grid) + margin + 2 * block_size_;                 // whole blocks; to the centre; and half a block of motion
+  const MapWindow window(grid, T_world_camera, block_size_, margin, {});  // refuses what is absurd
+  return grid_reach(grid) + margin + 2 * block_size_;                     // whole blocks; to the centre; and half a block of motion
 }
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
-  window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid));
+  const double margin = window_margin(grid);
   largest_radius_ = std::max(largest_radius_, largest_created(grid));
+  window_ = MapWindow(grid, T_world_camera, block_size_, margin, {largest_radius_, thickness_});
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
