@@ -50,8 +50,15 @@ namespace frontier_surfels {
 // Elements that one work item adds up in a prefix sum.
 #define SCAN_CHUNK 64
 
+// Words whose set bits one work item lists.
+#define WORD_CHUNK 16
+
 // Surfels of a page of the map: a bit each in the words that say something of a page.
 #define PAGE_SLOTS 64
+
+// Work items that go through a page's surfels, LANES each, and of groups of such: several pages.
+#define PAGE_ITEMS (PAGE_SLOTS / LANES)
+#define PAGE_GROUP 64
 
 // Work items that sort new surfels by block, one after the other each its share.
 #define SORT_CHUNKS 64

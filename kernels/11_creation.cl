@@ -1,16 +1,17 @@
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
 // New surfel filter. One work item a listed candidate: those that are known, or whose directions cancel, make no surfel.
-//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left;  known: K~
+//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left;  known: K~, where it has been computed
 //   out kept[count]: 1 or 0
 __kernel void filter_candidates(const Limits limits, __global const int* voxels, const int count, __global const float* directions,
-                                __global const ulong* candidates, __global const ulong* known, __global uint* kept) {
+                                __global const ulong* candidates, const int has_known, __global const ulong* known, __global uint* kept) {
   const int n = get_global_id(0);
   if (n >= count) return;
   const int word = voxels[n] / 64, bit = voxels[n] % 64;
   __global const float* direction = directions + n / LANES * 3 * LANES + n % LANES;
   const bool has_normal = length((float3)(direction[0], direction[LANES], direction[2 * LANES])) >= limits.normal_min;
-  kept[n] = has_normal && ((candidates[word] & ~known[word]) >> bit & 1) != 0 ? 1 : 0;
+  const ulong open = has_known ? candidates[word] & ~known[word] : candidates[word];
+  kept[n] = has_normal && (open >> bit & 1) != 0 ? 1 : 0;
 }
 
 // One work item a listed candidate.

@@ -1,13 +1,15 @@
 // Labels and colour - paper 3.5: a surfel where a column of observed voxels ends at a measured surface is occupied, for ever.
 
-// One work item LANES surfels, one group a page of the window: those that are new, and those that 4_removal has found at a surface.
+// One work item LANES surfels of a page of the window: those that are new, and those that 4_removal has found at a surface.
 //   in  changed: which surfels they are;  depth, column_end: of 2_observed_space
 //       color[height][width]: red | green << 8 | blue << 16, if has_color
-__kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void label_surfels(
-    const Grid g, const Limits limits, const Window window, const Transform T_camera_local, __global const float* depth,
-    __global const int* column_end, __global const uint* color, const int has_color, __global const uint* pages,
-    __global const ulong* alive, __global const ulong* changed, __global const int4* page_block, __global uint4* surfels) {
-  const uint page = pages[get_group_id(0)], first = PAGE_SLOTS * page + LANES * get_local_id(0);
+__kernel void label_surfels(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
+                            __global const float* depth, __global const int* column_end, __global const uint* color, const int has_color,
+                            __global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
+                            __global const int4* page_block, __global uint4* surfels) {
+  const uint n = get_global_id(0) / PAGE_ITEMS;
+  if (n >= count) return;
+  const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page] & changed[page], first);
   if (lanes == 0) return;
   const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
@@ -18,9 +20,9 @@ __kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void la
   int pixel[LANES];
   vstore16(at, 0, pixel);
   for (uint left = lanes & lane_bits(labelled); left != 0; left &= left - 1) {
-    const int n = lowest_lane(left);
-    uint attributes = surfels[first + n].w | SURFEL_OCCUPIED;
-    if (has_color && (attributes & SURFEL_COLORED) == 0) attributes = (attributes & 0xff000000u) | SURFEL_COLORED | color[pixel[n]];
-    surfels[first + n].w = attributes;
+    const int m = lowest_lane(left);
+    uint attributes = surfels[first + m].w | SURFEL_OCCUPIED;
+    if (has_color && (attributes & SURFEL_COLORED) == 0) attributes = (attributes & 0xff000000u) | SURFEL_COLORED | color[pixel[m]];
+    surfels[first + m].w = attributes;
   }
 }

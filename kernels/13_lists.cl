@@ -1,9 +1,12 @@
 // Lists in a fixed order from bit fields and counts, whatever the number of threads: counts, their prefix sum, then the entries.
 
-// One work item a word: set bits.
+// One work item a chunk of WORD_CHUNK words: their set bits.
 __kernel void count_bits(__global const ulong* words, const uint count, __global uint* counts) {
-  const uint n = get_global_id(0);
-  if (n < count) counts[n] = popcount(words[n]);
+  const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
+  if (begin >= count) return;
+  uint sum = 0;
+  for (uint n = begin; n < min(begin + WORD_CHUNK, count); ++n) sum += (uint)popcount(words[n]);
+  counts[chunk] = sum;
 }
 
 // One work item a chunk of SCAN_CHUNK values: their sum.
@@ -43,10 +46,12 @@ __kernel void scan_few(__global uint* values, const uint count) {
   values[count] = sum;
 }
 
-// One work item a word: the numbers 64 n + bit of its set bits.
+// One work item a chunk of WORD_CHUNK words: the numbers 64 n + bit of their set bits.
+//   in  offsets: prefix sum of count_bits'
 __kernel void list_bits(__global const ulong* words, const uint count, __global const uint* offsets, __global uint* list) {
-  const uint n = get_global_id(0);
-  if (n >= count) return;
-  uint at = offsets[n];
-  for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
+  const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
+  if (begin >= count) return;
+  uint at = offsets[chunk];
+  for (uint n = begin; n < min(begin + WORD_CHUNK, count); ++n)
+    for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
 }

@@ -20,13 +20,6 @@ __kernel void count_cells(__global const uint* new_cells, const uint count, __gl
   for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
 }
 
-// One work item a cell, and one more.
-//   in  histogram: its prefix sum, the total behind it;   out cell_begin[cells + 1]: where each cell's new surfels begin when sorted
-__kernel void begin_cells(__global const uint* histogram, const uint cells, __global uint* cell_begin) {
-  const uint cell = get_global_id(0);
-  if (cell <= cells) cell_begin[cell] = histogram[SORT_CHUNKS * cell];
-}
-
 // One work item a chunk of the new surfels.
 //   i/o histogram: prefix sum before, then where each chunk's share of each cell ends;   out order[count]: new surfels sorted by cell
 __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __global uint* histogram, __global uint* order) {
@@ -43,13 +36,18 @@ __kernel void count_free(__global const uint* pages, const uint count, __global 
   if (n < count) free_slots[n] = PAGE_SLOTS - popcount(alive[pages[n]]);
 }
 
-// One work item a cell: pages that its block needs in addition.
-//   in  cell_pages[cells + 1]: where each cell's pages begin in their list;  free_before: prefix sum of count_free's, the total behind it
-__kernel void count_missing_pages(__global const uint* cell_begin, __global const uint* cell_pages, __global const uint* free_before,
-                                  const uint cells, __global uint* missing) {
+// One work item a cell, and one more: where its new surfels begin when sorted, and pages that its block needs in addition.
+//   in  histogram: its prefix sum, the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
+//       free_before: prefix sum of count_free's, the total behind it
+//   out cell_begin[cells + 1];  missing[cells]
+__kernel void begin_cells(__global const uint* histogram, __global const uint* cell_pages, __global const uint* free_before,
+                          const uint cells, __global uint* cell_begin, __global uint* missing) {
   const uint cell = get_global_id(0);
-  if (cell >= cells) return;
-  const uint wanted = cell_begin[cell + 1] - cell_begin[cell], there = free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]];
+  if (cell > cells) return;
+  cell_begin[cell] = histogram[SORT_CHUNKS * cell];
+  if (cell == cells) return;
+  const uint wanted = histogram[SORT_CHUNKS * (cell + 1)] - histogram[SORT_CHUNKS * cell],
+             there = free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]];
   missing[cell] = wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0;
 }
 

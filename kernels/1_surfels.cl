@@ -100,6 +100,6 @@ INLINE uint lanes_of_page(ulong word, uint first) { return (uint)(word >> (first
 // The word whose parts are lanes[0 ... 3].
 INLINE ulong pack_lanes(__local const ushort* lanes) {
   ulong bits = 0;
-  for (int n = 0; n < PAGE_SLOTS / LANES; ++n) bits |= (ulong)lanes[n] << (LANES * n);
+  for (int n = 0; n < PAGE_ITEMS; ++n) bits |= (ulong)lanes[n] << (LANES * n);
   return bits;
 }

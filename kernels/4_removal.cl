@@ -25,55 +25,57 @@ INLINE void clear_candidates(__global int* candidates, int16 at, int16 bit, int1
   }
 }
 
-// What is found out of LANES surfels, a bit each.
+// What is found out of a page's surfels, a bit each.
 typedef struct {
-  ushort in_view[PAGE_SLOTS / LANES], large[PAGE_SLOTS / LANES], removed[PAGE_SLOTS / LANES], labelled[PAGE_SLOTS / LANES];
+  ushort in_view[PAGE_ITEMS], large[PAGE_ITEMS], removed[PAGE_ITEMS], labelled[PAGE_ITEMS];
 } PageLanes;
 
-// One work item LANES surfels, one group a page of the window.
+// One work item LANES surfels of a page of the window.
 //   in  pages[count]: those of the window;  observed: C~, as 32-bit halves;  view: this frame as its own camera sees it, depths: its
 //       image, for the exact test;  depth, column_end: of 2_observed_space
 //   i/o candidates: as 32-bit halves: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
 //       counts: COUNT_IN_VIEW, COUNT_LARGE
 //   out in_view[count], large[count], removed[count]
-__kernel __attribute__((reqd_work_group_size(PAGE_SLOTS / LANES, 1, 1))) void visit_surfels(
+__kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
     const int has_color, __global const float* depths, __global const float* depth, __global const int* column_end,
-    __global const uint* pages, __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels,
-    __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view, __global ulong* large,
-    __global ulong* removed, __global uint* counts) {
-  __local PageLanes found;
-  const uint page = pages[get_group_id(0)], item = get_local_id(0), first = PAGE_SLOTS * page + LANES * item;
-  found.in_view[item] = found.large[item] = found.removed[item] = found.labelled[item] = 0;
-  const uint lanes = lanes_of_page(alive[page], first);
+    __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
+    __global const uint4* surfels, __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view,
+    __global ulong* large, __global ulong* removed, __global uint* counts) {
+  __local PageLanes all_found[PAGE_GROUP / PAGE_ITEMS];
+  const uint n = get_global_id(0) / PAGE_ITEMS, item = get_local_id(0) % PAGE_ITEMS;
+  __local PageLanes* found = &all_found[get_local_id(0) / PAGE_ITEMS];
+  const uint page = pages[min(n, count - 1)], first = PAGE_SLOTS * page + LANES * item;
+  found->in_view[item] = found->large[item] = found->removed[item] = found->labelled[item] = 0;
+  const uint lanes = n < count ? lanes_of_page(alive[page], first) : 0;
   if (lanes != 0) {
     const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
     const float16 voxel = voxel_sizes(&g, s.position.z);
     const int16 seen = reach_grid(&g, &limits, &s, voxel) & lane_marks(lanes);
-    found.in_view[item] = (ushort)lane_bits(seen);
+    found->in_view[item] = (ushort)lane_bits(seen);
     const Voxels v = voxels_at(&g, s.position);
     const int16 inside = inside_grid16(&g, v) & seen;
     if (lane_bits(inside) != 0) {
-      found.large[item] = (ushort)lane_bits(inside & (s.radius / voxel >= limits.split_radius));
+      found->large[item] = (ushort)lane_bits(inside & (s.radius / voxel >= limits.split_radius));
       const int16 at = inside ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + ((v.k >> 5) & 1) : 0;
       const int16 bit = (int16)(1) << (v.k & 31);
       int16 stay = inside & ((gather_int(observed, at) & bit) == 0);
       stay &= ~leaves(&limits, &view, remove_buried, depths, &s, stored_normals(&s, &T_camera_local), stay);
-      found.removed[item] = (ushort)lane_bits(inside & ~stay);
+      found->removed[item] = (ushort)lane_bits(inside & ~stay);
       int16 pixel;
       const int16 unlabelled = stay & lacks_label(s.attributes, has_color);
-      found.labelled[item] =
+      found->labelled[item] =
           (ushort)lane_bits(at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &pixel));
       clear_candidates(candidates, at, bit, stay);
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (item > 0) return;
-  const ulong in_view_here = pack_lanes(found.in_view), large_here = pack_lanes(found.large);
-  in_view[get_group_id(0)] = in_view_here;
-  large[get_group_id(0)] = large_here;
-  removed[get_group_id(0)] = pack_lanes(found.removed);
-  changed[page] |= pack_lanes(found.labelled);
+  if (item > 0 || n >= count) return;
+  const ulong in_view_here = pack_lanes(found->in_view), large_here = pack_lanes(found->large);
+  in_view[n] = in_view_here;
+  large[n] = large_here;
+  removed[n] = pack_lanes(found->removed);
+  changed[page] |= pack_lanes(found->labelled);
   if (in_view_here != 0) atomic_add(&counts[COUNT_IN_VIEW], (uint)popcount(in_view_here));
   if (large_here != 0) atomic_add(&counts[COUNT_LARGE], (uint)popcount(large_here));
 }

@@ -6,7 +6,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kFew = 2048, kFewOfCpu = 32768;  // one more launch would take longer
+constexpr std::size_t kFew = 2048, kFewOfCpu = 65536;  // one more launch would take longer
 
 }  // namespace
 
@@ -39,11 +39,13 @@ void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::siz
 
 std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
   if (count == 0) return 0;
-  counts_.resize(count + 1);
-  commands_.run(stage, "count_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_());
-  const std::uint32_t total = scan(stage, counts_, count);
+  const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
+  const auto words = static_cast<cl_uint>(count);
+  counts_.resize(chunks + 1);
+  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
+  const std::uint32_t total = scan(stage, counts_, chunks);
   list.resize(total);
-  if (total > 0) commands_.run(stage, "list_bits", count, kGroup, bits(), static_cast<cl_uint>(count), counts_(), list());
+  if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, counts_(), list());
   return total;
 }
 

@@ -111,14 +111,13 @@ Report Mapper::Impl::integrate(const DepthFrame& frame) {
   // Candidates that a recent view knows are none
   stages.settle_by_recent_views();
 
-  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8)
+  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8). What no view saw is unknown where all are
+  // kept
   if (stages.is_open()) {
     stages.compute_sign_field();
     stages.compute_known_hull();
     stages.sweep_paths();
     stages.filter_median();
-  } else {
-    stages.assume_unknown();
   }
   stages.filter_candidates();
 

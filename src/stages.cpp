@@ -6,9 +6,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kGroup = 64;                        // work items of a group, where kernels do not say otherwise
-constexpr std::size_t kGroupOfPage = PAGE_SLOTS / LANES;  // of kernels whose work items do LANES surfels each
-constexpr double kHullReach = 1;  // times z_max: surfels further from the grid say nothing of the paths that enter it
+constexpr std::size_t kGroup = 64;  // work items of a group, where kernels do not say otherwise
+constexpr double kHullReach = 1;    // times z_max: surfels further from the grid say nothing of the paths that enter it
 
 Limits make_limits(const Config& config) {
   Limits limits = {};
@@ -144,10 +143,10 @@ void Stages::visit_surfels() {
   removed_bits_.resize(pages + 1);
   counts_.resize(COUNTS);
   counts_.fill(stage, 0, COUNTS);
-  commands_.run(stage, "visit_surfels", kGroupOfPage * pages, kGroupOfPage, grid_, limits_, window_, T_camera_local_, views_.own_view(),
+  commands_.run(stage, "visit_surfels", PAGE_ITEMS * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_, views_.own_view(),
                 static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
-                map_.pages(), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(), map_.changed(), in_view_bits_(),
-                large_bits_(), removed_bits_(), counts_());
+                map_.pages(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(),
+                map_.changed(), in_view_bits_(), large_bits_(), removed_bits_(), counts_());
 }
 
 std::size_t Stages::select_in_view() {
@@ -188,8 +187,6 @@ void Stages::place_surfels() {
                 in_view_slots_(), count, view_surfels_());
 }
 
-void Stages::assume_unknown() { filtered_.fill("median", 0, words()); }
-
 void Stages::compute_sign_field() {
   const char* stage = "sign_field";
   place_surfels();
@@ -213,7 +210,7 @@ void Stages::compute_known_hull() {
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
   hull_faces_.fill(stage, 0xffffffffU, 2 * (j * k + i * k + i * j));
   const std::size_t pages = map_.list_pages_near(kHullReach * config_.z_max, near_pages_);
-  commands_.run(stage, "project_hull", kGroupOfPage * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
+  commands_.run(stage, "project_hull", PAGE_ITEMS * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
                 static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), lines_(), hull_faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), grid_, hull_faces_(),
@@ -273,7 +270,7 @@ void Stages::filter_candidates() {
   const auto count = static_cast<cl_int>(listed_count_);
   kept_offsets_.resize(listed_count_ + 1);
   commands_.run(stage, "filter_candidates", listed_count_, kGroup, limits_, listed_voxels_(), count, directions_(), candidates_(),
-                filtered_(), kept_offsets_());
+                static_cast<cl_int>(is_open()), filtered_(), kept_offsets_());
   created_count_ = lists_.scan(stage, kept_offsets_, listed_count_);
   created_.resize(created_count_);
   if (created_count_ > 0) commands_.run(stage, "list_kept", listed_count_, kGroup, kept_offsets_(), count, created_());
@@ -303,9 +300,10 @@ std::size_t Stages::create_surfels() {
 }
 
 void Stages::label_surfels() {
-  commands_.run("labels", "label_surfels", kGroupOfPage * map_.window_pages(), kGroupOfPage, grid_, limits_, window_, T_camera_local_,
-                depth_(), column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), map_.alive(), map_.changed(),
-                map_.page_block(), map_.surfels());
+  const std::size_t pages = map_.window_pages();
+  commands_.run("labels", "label_surfels", PAGE_ITEMS * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_, depth_(),
+                column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), static_cast<cl_uint>(pages), map_.alive(),
+                map_.changed(), map_.page_block(), map_.surfels());
 }
 
 std::vector<BlockKey> Stages::finish_frame() { return map_.finish_frame("labels", frame_); }

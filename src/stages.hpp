@@ -32,13 +32,12 @@ class Stages {
   std::size_t select_in_view();
   std::size_t split_surfels();                         ///< @return surfels that this adds to the map
   bool is_open() const { return !views_.complete(); }  ///< whether section 4 has anything left to decide
-  void assume_unknown();                               ///< K~ = 0: what the recent views did not see is unknown
   void compute_sign_field();                           ///< events of D
   void compute_known_hull();                           ///< states in which paths enter the grid
   void sweep_paths();                                  ///< K'
   void filter_median();                                ///< K~
   void settle_by_recent_views();                       ///< candidates that a kept view knows are dropped
-  void filter_candidates();                            ///< candidates without a normal are dropped
+  void filter_candidates();                            ///< candidates that are known, or without a normal, are dropped
   std::size_t remove_surfels();  ///< @return how many; device memory for what create_surfels adds is made sure of before
   std::size_t create_surfels();  ///< @return how many
   void label_surfels();          ///< new ones, and those that select_in_view has noted

@@ -142,15 +142,13 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   histogram_.fill(stage, 0, bins);
   commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
+  count_free(stage);
   cell_begin_.resize(cell_count + 1);
-  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_count, cell_begin_());
+  missing_.resize(cell_count);
+  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
+                missing_());
   order_.resize(count);
   commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), n, histogram_(), order_());
-
-  count_free(stage);
-  missing_.resize(cell_count);
-  commands_.run(stage, "count_missing_pages", cell_count, kGroup, cell_begin_(), cell_pages_list_(), free_before_(), cell_count,
-                missing_());
   add_pages(stage, missing_.read(cell_count));
 
   commands_.run(stage, "fill_pages", window_pages(), kGroup, pages_list_(), page_cells_list_(), static_cast<cl_uint>(window_pages()),

@@ -15,7 +15,8 @@ namespace {
 
 using namespace reference;
 
-void check_filter(const Camera& camera, double observed_density, double known_density) {
+/// @param all_views  no view has been forgotten: K~ has not been computed, and is not looked at
+void check_filter(const Camera& camera, double observed_density, double known_density, bool all_views = false) {
   SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
   Random random(1);
   const Nuvg grid(camera.intrinsics, camera.config);
@@ -28,11 +29,12 @@ void check_filter(const Camera& camera, double observed_density, double known_de
   probe.set_observed(observed);
   probe.set_filtered(known);
   probe.set_candidates(candidates);
+  if (all_views) probe.views().clear(true);
   probe.list_candidates();
   probe.stages().filter_candidates();
   Field<Truth> expected = grid.field(Truth::no);
   for_each_voxel(candidates, [&](int i, int j, int k) {
-    if (!candidates(i, j, k) || known(i, j, k)) return;
+    if (!candidates(i, j, k) || (known(i, j, k) && !all_views)) return;
     expected(i, j, k) = !less(sum_of_directions(grid, observed, Vector3i(i, j, k)).norm(), 0.01, 1e-4);
   });
   expect_equal("candidates left", expected, probe.created());
@@ -50,6 +52,10 @@ TEST(StageCreation, FilterWithNothingObservedOrAllKnown) {
   check_filter(camera, 0, 0);
   check_filter(camera, 0.5, 0);
   check_filter(camera, 0.5, 1);
+}
+
+TEST(StageCreation, FilterWhileNoViewIsForgotten) {
+  for (const Camera& camera : cameras()) check_filter(camera, 0.3, 0.5, true);
 }
 
 /// Two observed voxels on opposite sides cancel; a third one decides.
@@ -165,7 +171,7 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   probe.set_observed(scene.observed);
   probe.set_candidates(candidates);
   probe.stages().settle_by_recent_views();
-  probe.stages().assume_unknown();
+  probe.set_filtered(Field<char>(probe.grid(), 0));
   probe.stages().filter_candidates();
   candidates = probe.created();
   probe.set_removed_words(std::vector<std::uint64_t>(probe.window_pages().size(), 0));

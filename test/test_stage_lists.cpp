@@ -9,11 +9,11 @@ namespace {
 
 using reference::Random;
 
-/// Around a word, a chunk, what one work item scans alone (2048; on a CPU 32768), and a second and a third level of sums.
+/// Around a word, a chunk, what one work item scans alone (2048; on a CPU 65536), and a second and a third level of sums.
 std::vector<std::size_t> sizes() {
-  std::vector<std::size_t> sizes = {0, 1, 63, 64, 65, 2047, 2048, 2049};
+  std::vector<std::size_t> sizes = {0, 1, 15, 16, 17, 63, 64, 65, 2047, 2048, 2049};
   if (reference::small_tests()) return sizes;
-  sizes.insert(sizes.end(), {2112, 32767, 32768, 32769, 100000, 64 * 2048, 64 * 2048 + 1, 64 * 32768, 64 * 32768 + 1, 64 * 64 * 2048 + 77});
+  sizes.insert(sizes.end(), {2112, 65535, 65536, 65537, 100000, 64 * 2048, 64 * 2048 + 1, 64 * 65536, 64 * 65536 + 1, 64 * 64 * 2048 + 77});
   return sizes;
 }
 

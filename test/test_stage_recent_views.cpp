@@ -131,9 +131,6 @@ TEST(StageRecentViews, CompleteUntilOneIsForgotten) {
     EXPECT_TRUE(probe.views().keep_current());
     EXPECT_EQ(probe.stages().is_open(), open);
   }
-  probe.set_filtered(random_field(probe.grid(), 0.5, random));
-  probe.stages().assume_unknown();
-  expect_equal("K~", Field<char>(probe.grid(), 0), probe.filtered());
 }
 
 /// A larger image than ever before has no room beside the kept ones: they go, and nothing is mixed up.
