@@ -1,6 +1,10 @@
 #include "opencl/commands.hpp"
 
+#include <sys/mman.h>
+
 #include <algorithm>
+#include <cstdlib>
+#include <memory>
 
 #include "opencl/kernel_files.hpp"
 
@@ -12,6 +16,20 @@ std::string source() {
   std::string text;
   for (const auto& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
   return text;
+}
+
+constexpr std::size_t kHugePage = 2 << 20;  // of the usual processors
+
+/// Memory of the host as a buffer: a CPU works on it in place, and finds its way in few large pages sooner than in many small ones.
+cl::Buffer allocate_on_host(const cl::Context& context, std::size_t bytes) {
+  const std::size_t whole = (bytes + kHugePage - 1) / kHugePage * kHugePage;
+  std::unique_ptr<void, decltype(&std::free)> memory(std::aligned_alloc(kHugePage, whole), &std::free);
+  if (memory == nullptr) throw cl::Error(CL_MEM_OBJECT_ALLOCATION_FAILURE, "aligned_alloc");
+  madvise(memory.get(), whole, MADV_HUGEPAGE);  // advice only: nothing is lost where it is not taken
+  cl::Buffer buffer(context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes, memory.get());
+  buffer.setDestructorCallback([](cl_mem, void* own) { std::free(own); }, memory.get());
+  memory.release();
+  return buffer;
 }
 
 cl::Program build(const Device& device) {
@@ -74,7 +92,8 @@ cl::Buffer Commands::allocate(std::size_t bytes) {
   if (bytes > most_bytes_)
     throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
                       std::to_string(most_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
-  cl::Buffer buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+  cl::Buffer buffer = device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
+                                                           : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
   allocated_bytes_ += bytes;
   return buffer;
 }
