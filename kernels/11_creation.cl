@@ -30,7 +30,7 @@ INLINE float16 front_distances(const Grid* g, float16 z) { return 1.75f * 0.8660
 Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
                       Points center, Points mean, int16 around, int16 asked, int16* ragged) {
   const float16 reach = front_distances(g, center.z);
-  *ragged = asked & ~knows(view, depths, add_scaled(center, reach, mean), asked);
+  *ragged = asked & ~own_view_knows(view, depths, add_scaled(center, reach, mean), asked);
   if (lane_bits(*ragged) == 0) return mean;
   Points best = mean;
   float16 best_cosine = -1.0f;
@@ -41,7 +41,7 @@ Points surfel_normals(const Grid* g, const View* view, __global const float* dep
     const Points direction = normalized((Points){u.x - center.x, u.y - center.y, u.z - center.z});
     const float16 cosine = direction.x * mean.x + direction.y * mean.y + direction.z * mean.z;
     better &= cosine > best_cosine;
-    better = knows(view, depths, add_scaled(center, reach, direction), better);
+    better = own_view_knows(view, depths, add_scaled(center, reach, direction), better);
     best.x = better ? direction.x : best.x;
     best.y = better ? direction.y : best.y;
     best.z = better ? direction.z : best.z;
@@ -57,14 +57,14 @@ Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* aro
   const float16 step = 0.1f * voxel_sizes(g, center.z), front = front_distances(g, center.z);
   const Points forward = {step * normal.x, step * normal.y, step * normal.z};
   const Points ahead = {front * normal.x, front * normal.y, front * normal.z};
-  const int16 has_front = knows(view, depths, add_scaled(center, 1.0f, ahead), asked);
+  const int16 has_front = own_view_knows(view, depths, add_scaled(center, 1.0f, ahead), asked);
   int16 moving = asked, steps = 0;
   for (int n = 1; n <= 4 && lane_bits(moving) != 0; ++n) {
     const Points next = add_scaled(center, (float)n, forward);
     moving &= same_voxels(voxels_at(g, next), v);
-    moving &= ~knows(view, depths, next, moving);
-    moving &= ~knows(view, depths, add_scaled(next, 1.0f, forward), moving);
-    moving &= ~has_front | knows(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
+    moving &= ~own_view_knows(view, depths, next, moving);
+    moving &= ~own_view_knows(view, depths, add_scaled(next, 1.0f, forward), moving);
+    moving &= ~has_front | own_view_knows(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
     steps -= moving;
   }
   int16 open = asked & (steps > 0);

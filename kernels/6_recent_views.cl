@@ -175,17 +175,22 @@ INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int
 
 // Which of LANES candidates of a tile are known to one of some views.
 //   asked: -1 where there is a candidate;  numbers[count]: of the views
+//   i/o at: the view that is asked first, after it those behind it, then the others; becomes the last that was asked: where one settled all
+//       candidates that were left, it will settle many of the next ones, too
 int16 find_settled(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __local const ushort* numbers,
-                   int count, __global const float* depths, int16 entries, int16 asked) {
+                   int count, __global const float* depths, int16 entries, int16 asked, int* at) {
   const int16 column = entries / VIEW_TILE_K;
   const Voxels v = {tile.x * VIEW_TILE + column % VIEW_TILE, tile.y * VIEW_TILE + column / VIEW_TILE,
                     tile.z * VIEW_TILE_K + entries % VIEW_TILE_K};
   const Points center = voxel_centers(g, layer_depth, v);
   int16 open = asked;
+  int last = *at;
   for (int n = 0; n < count && lane_bits(open) != 0; ++n) {
-    const View view = views[numbers[n]];
+    last = *at + n < count ? *at + n : *at + n - count;
+    const View view = views[numbers[last]];
     open &= ~knows(&view, depths, center, asked);  // not of `open` only: what is asked of a view must not wait for the view before
   }
+  *at = last;
   return asked & ~open;
 }
 
@@ -197,11 +202,12 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
   const int lane = get_local_id(0), lanes = get_local_size(0);
   for (uint first = 0; first < own->view_count && own->entry_count != 0; first += count, count *= 2) {
     const int entries = own->entry_count, asked_views = min(count, own->view_count - first);
+    int at = 0;
     for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
       const int16 asked = lane_numbers() < entries - chunk * LANES;
       const int16 candidate = asked ? convert_int16(vload16(chunk, own->entries)) : 0;
       own->settled[chunk] =
-          (ushort)lane_bits(find_settled(g, tile, layer_depth, views, own->views + first, asked_views, depths, candidate, asked));
+          (ushort)lane_bits(find_settled(g, tile, layer_depth, views, own->views + first, asked_views, depths, candidate, asked, &at));
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     if (lane == 0) drop_settled(own);
@@ -234,7 +240,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
       list_first_views(&own, view_count);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    ask_views(&g, tile, layer_depth, views, depths, 2, &own);
+    ask_views(&g, tile, layer_depth, views, depths, FIRST_VIEWS, &own);
     if (own.entry_count != 0) {
       const int first_layer = tile.z * VIEW_TILE_K;
       const Box box =
