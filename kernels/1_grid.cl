@@ -5,6 +5,16 @@
 
 #pragma OPENCL FP_CONTRACT OFF
 
+// Asks for the 64 bytes at an address ahead of their use. OpenCL's own prefetch() does nothing in PoCL.
+#if defined(ON_CPU) && defined(POCL_DEVICE_ADDRESS_BITS) && defined(__has_builtin)
+#if __has_builtin(__builtin_prefetch)
+#define PREFETCH(address) __builtin_prefetch((const void*)(uintptr_t)(address))
+#endif
+#endif
+#ifndef PREFETCH
+#define PREFETCH(address) prefetch((__global const uint16*)(address), 1)
+#endif
+
 #define INLINE static inline __attribute__((always_inline))
 
 INLINE float voxel_size(const Grid* g, float z) { return fmax(z, g->z_min) / g->f; }

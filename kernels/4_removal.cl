@@ -47,6 +47,8 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
   __local PageLanes* found = &all_found[get_local_id(0) / PAGE_ITEMS];
   const uint page = pages[min(n, count - 1)], first = PAGE_SLOTS * page + LANES * item;
   found->in_view[item] = found->large[item] = found->removed[item] = found->labelled[item] = 0;
+  const uint next = pages[min(n + 3, count - 1)];  // pages lie anywhere in the map
+  for (int m = 0; m < LANES; m += 4) PREFETCH(surfels + PAGE_SLOTS * next + LANES * item + m);
   const uint lanes = n < count ? lanes_of_page(alive[page], first) : 0;
   if (lanes != 0) {
     const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);

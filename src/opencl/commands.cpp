@@ -33,7 +33,7 @@ cl::Buffer allocate_on_host(const cl::Context& context, std::size_t bytes) {
 }
 
 cl::Program build(const Device& device) {
-  const std::string options = std::string("-cl-std=CL1.2 -Werror -DSIGN_FIELD_GROUP=") + (device.is_cpu ? "1" : "64");
+  const std::string options = std::string("-cl-std=CL1.2 -Werror -DSIGN_FIELD_GROUP=") + (device.is_cpu ? "1 -DON_CPU" : "64");
   cl::Program program(device.context, source());
   try {
     program.build({device.device}, options.c_str());
@@ -93,7 +93,7 @@ cl::Buffer Commands::allocate(std::size_t bytes) {
     throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
                       std::to_string(most_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
   cl::Buffer buffer = device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
-                                                           : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+                                                               : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
   allocated_bytes_ += bytes;
   return buffer;
 }
