@@ -13,10 +13,11 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
 INLINE uint chunk_begin(uint count, uint chunk) { return (uint)((ulong)count * chunk / SORT_CHUNKS); }
 
 // One work item a chunk of the new surfels.
-//   i/o histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell; zero before
-__kernel void count_cells(__global const uint* new_cells, const uint count, __global uint* histogram) {
+//   out histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, const uint count, const uint cells, __global uint* histogram) {
   const uint chunk = get_global_id(0);
   if (chunk >= SORT_CHUNKS) return;
+  for (uint cell = 0; cell < cells; ++cell) histogram[SORT_CHUNKS * cell + chunk] = 0;
   for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
 }
 
@@ -51,15 +52,20 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
   missing[cell] = wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0;
 }
 
+INLINE uint cell_of(const Window* window, int4 block) {
+  const int x = block.x - window->origin_x, y = block.y - window->origin_y, z = block.z - window->origin_z;
+  return (uint)((z * window->size_y + y) * window->size_x + x);
+}
+
 // One work item a page of the window, by cell: its free slots take their share of the cell's new surfels.
-//   in  page_cells[count]: cell of each page
 //   i/o the map
-__kernel void fill_pages(__global const uint* pages, __global const uint* page_cells, const uint count, __global const uint* cell_begin,
-                         __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
-                         __global const uint4* new_surfels, __global ulong* alive, __global ulong* changed, __global uint4* surfels) {
+__kernel void fill_pages(const Window window, __global const uint* pages, const uint count, __global const int4* page_block,
+                         __global const uint* cell_begin, __global const uint* cell_pages, __global const uint* free_before,
+                         __global const uint* order, __global const uint4* new_surfels, __global ulong* alive, __global ulong* changed,
+                         __global uint4* surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
-  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
+  const uint page = pages[n], cell = cell_of(&window, page_block[page]), end = cell_begin[cell + 1];
   uint at = cell_begin[cell] + free_before[n] - free_before[cell_pages[cell]];
   ulong taken = 0;
   for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
@@ -78,13 +84,14 @@ __kernel void begin_pages(__global const uint* pages, const uint count, __global
 }
 
 // One work item a page that a block has just got.
-__kernel void begin_new_pages(__global const uint* pages, __global const int4* blocks, const uint count, __global ulong* alive,
-                              __global ulong* changed, __global int4* page_block) {
+//   in  new_pages[count]: x, y, z of the block, w: the page
+__kernel void begin_new_pages(__global const int4* new_pages, const uint count, __global ulong* alive, __global ulong* changed,
+                              __global int4* page_block) {
   const uint n = get_global_id(0);
   if (n >= count) return;
-  const uint page = pages[n];
+  const uint page = (uint)new_pages[n].w;
   alive[page] = changed[page] = 0;
-  page_block[page] = blocks[n];
+  page_block[page] = (int4)(new_pages[n].xyz, 0);
 }
 
 // One work item a page of the window.

@@ -81,7 +81,9 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
 
 // One work item words of LANES columns.
 //   in  observed: C~, with LANES words to spare;   out candidates: also those that surviving surfels take; 4_removal knows them
-__kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates) {
+//       counts: 0, for what 4_removal counts next
+__kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
+  if (get_global_id(0) < COUNTS) counts[get_global_id(0)] = 0;
   const int chunks = grid_chunks(g.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % g.words_k,
             j = get_global_id(0) / chunks / g.words_k;
   if (j >= g.size_j) return;

@@ -47,18 +47,18 @@ INLINE int16 reaches_side(float16 x, float16 half_x, float16 z, float16 half_z, 
 }
 
 // Does a view know nothing in a rectangle of its image at the depth `near` or beyond?
-INLINE bool is_hidden(const View* view, __global const float* block_depths, int4 pixels, float near) {
+INLINE bool is_hidden(const View* view, __global const float* depths, int4 pixels, float near) {
   const int columns = (view->width + VIEW_BLOCK - 1) / VIEW_BLOCK;
   const int4 blocks = pixels / VIEW_BLOCK;
   for (int t = blocks.y; t <= blocks.w; ++t)
     for (int s = blocks.x; s <= blocks.z; ++s)
-      if (block_depths[view->first_block + t * columns + s] > near) return false;
+      if (depths[view->first_block + t * columns + s] > near) return false;
   return true;
 }
 
 // Which of a group of LANES views may know a point of a box, a bit each. The others certainly know none: the box is outside of their
 // image, or behind all that they have seen there.
-uint views_of_box(__global const float* lanes, __global const View* views, __global const float* block_depths, const Box* box) {
+uint views_of_box(__global const float* lanes, __global const View* views, __global const float* depths, const Box* box) {
   const BoxInViews b = box_in_views(lanes, box);
   const float16 fx = vload16(12, lanes), fy = vload16(13, lanes), cx = vload16(14, lanes) + 0.5f, cy = vload16(15, lanes) + 0.5f;
   const float16 width = vload16(16, lanes), height = vload16(17, lanes);
@@ -84,7 +84,7 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
   for (uint left_over = bits & lane_bits(in_front); left_over != 0; left_over &= left_over - 1) {
     const int n = lowest_lane(left_over);
     const View view = views[n];
-    if (is_hidden(&view, block_depths, (int4)(first_s[n], first_t[n], last_s[n], last_t[n]), nearest[n])) bits &= ~(1u << n);
+    if (is_hidden(&view, depths, (int4)(first_s[n], first_t[n], last_s[n], last_t[n]), nearest[n])) bits &= ~(1u << n);
   }
   return bits;
 }
@@ -216,13 +216,13 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
 }
 
 // One work-group VIEW_TILE x VIEW_TILE columns and a word's layers: 64 / VIEW_TILE_K tiles, each of VIEW_TILE_K layers.
-//   in  views[view_count];  view_lanes: the same, by lanes;  depths: their images;  block_depths: the largest depth of each block of them;
+//   in  views[view_count];  view_lanes: the same, by lanes;  depths: their images, and the largest depth of each block of them;
 //       layer_depth[size_k]
 //   out tile_views[tiles][groups of LANES views]: of tiles with candidates left: a bit for each view that may know something near them
 //   i/o candidates: those that a view knows are cleared
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
-                                const int view_count, __global const float* depths, __global const float* block_depths,
-                                __global const float* layer_depth, __global ushort* tile_views, __global ulong* candidates) {
+                                const int view_count, __global const float* depths, __global const float* layer_depth,
+                                __global ushort* tile_views, __global ulong* candidates) {
   const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + LANES - 1) / LANES;
   const int group = get_group_id(0), tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE;
@@ -247,7 +247,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
           tile_box(&g, layer_depth, tile.x, tile.y, first_layer + lowest_lane(layers), first_layer + 31 - (int)clz(layers), min_gap);
       __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
       for (int n = lane; n < view_groups; n += lanes)
-        own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, block_depths, &box);
+        own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, depths, &box);
       barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
       if (lane == 0) list_views(&own, own_views, view_groups);
       barrier(CLK_LOCAL_MEM_FENCE);

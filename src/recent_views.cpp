@@ -90,12 +90,7 @@ std::vector<std::size_t> spread(std::size_t count) {
 Transform to_transform(const Eigen::Isometry3d& T) { return to_transform(Eigen::Matrix<double, 3, 4>(T.matrix().topRows<3>())); }
 
 RecentViews::RecentViews(Commands& commands, const Config& config)
-    : config_(config),
-      complete_(config.recent_views > 0),
-      views_(commands),
-      view_lanes_(commands),
-      block_depths_(commands),
-      depths_(commands) {}
+    : config_(config), complete_(config.recent_views > 0), views_(commands), view_lanes_(commands), depths_(commands) {}
 
 void RecentViews::clear(bool map_is_empty) {
   kept_.clear();
@@ -103,22 +98,21 @@ void RecentViews::clear(bool map_is_empty) {
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
-  std::vector<float> depths = by_squares(image), blocks = find_block_depths(image);
-  if (depths.size() > room_pixels_ || blocks.size() > room_blocks_) {
+  std::vector<float> depths = by_squares(image);
+  const std::vector<float> blocks = find_block_depths(image);
+  const std::size_t pixels = depths.size();
+  depths.insert(depths.end(), blocks.begin(), blocks.end());
+  if (depths.size() > room_size_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
-    const std::size_t most_pixels = std::max(depths.size(), room_pixels_), most_blocks = std::max(blocks.size(), room_blocks_);
     clear(kept_.empty() && complete_);
-    depths_.allocate((config_.recent_views + 1) * most_pixels);
-    block_depths_.allocate((config_.recent_views + 1) * most_blocks);
-    room_pixels_ = most_pixels;
-    room_blocks_ = most_blocks;
+    depths_.allocate((config_.recent_views + 1) * depths.size());
+    room_size_ = depths.size();
   }
   std::vector<bool> taken(config_.recent_views + 1, false);
   for (const Kept& kept : kept_) taken[kept.room] = true;
   const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
-  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.send(std::move(depths), room * room_pixels_);
-  block_depths_.send(std::move(blocks), room * room_blocks_);
+  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room), pixels};
+  depths_.send(std::move(depths), room * room_size_);
 }
 
 View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
@@ -126,8 +120,8 @@ View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_came
   view.to_image = to_transform(Eigen::Matrix<double, 3, 4>(projection(kept.intrinsics) * T_view_camera.matrix().topRows<3>()));
   view.width = kept.intrinsics.width;
   view.height = kept.intrinsics.height;
-  view.first_pixel = static_cast<std::uint32_t>(kept.room * room_pixels_);
-  view.first_block = static_cast<std::uint32_t>(kept.room * room_blocks_);
+  view.first_pixel = static_cast<std::uint32_t>(kept.room * room_size_);
+  view.first_block = static_cast<std::uint32_t>(view.first_pixel + kept.pixels);
   return view;
 }
 

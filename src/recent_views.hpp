@@ -40,29 +40,28 @@ class RecentViews {
   /// The views that prepare() has sent once more, LANES together: [view_groups()][VIEW_LANE_FIELDS][LANES], zeros behind the last.
   const cl::Buffer& view_lanes() const { return view_lanes_(); }
   std::size_t view_groups() const { return (kept_.size() + LANES - 1) / LANES; }
-  /// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
-  const cl::Buffer& block_depths() const { return block_depths_(); }
   std::size_t count() const { return kept_.size(); }
 
  private:
   struct Kept {
     Intrinsics intrinsics;
     Eigen::Isometry3d T_world_camera;
-    std::size_t room = 0;  ///< in the pool, counted in images
+    std::size_t room = 0;    ///< in the pool
+    std::size_t pixels = 0;  ///< of its image there; the largest depths of blocks are behind them
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool adds_something() const;
 
   Config config_;
-  std::size_t room_pixels_ = 0;  ///< pixels of the largest image so far
-  std::size_t room_blocks_ = 0;  ///< its blocks, or those of another one that has more
+  std::size_t room_size_ = 0;  ///< what the largest image so far takes
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
   bool complete_;
   DeviceArray<View> views_;
   DeviceArray<float> view_lanes_;
-  DeviceArray<float> block_depths_;  ///< [recent_views + 1][room_blocks_]: as depths_
-  DeviceArray<float> depths_;        ///< [recent_views + 1][room_pixels_]: the kept views' images and the current one's
+  /// [recent_views + 1][room_size_]: the kept views' images and the current one's; behind each the largest depth in each block of
+  /// VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
+  DeviceArray<float> depths_;
 };
 
 }  // namespace frontier_surfels

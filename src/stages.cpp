@@ -141,8 +141,6 @@ void Stages::visit_surfels() {
   in_view_bits_.resize(pages + 1);
   large_bits_.resize(pages + 1);
   removed_bits_.resize(pages + 1);
-  counts_.resize(COUNTS);
-  counts_.fill(stage, 0, COUNTS);
   commands_.run(stage, "visit_surfels", PAGE_ITEMS * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_, views_.own_view(),
                 static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
                 map_.pages(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(),
@@ -228,8 +226,9 @@ void Stages::sweep_paths() {
 void Stages::filter_median() { commands_.run("median", "median", words(), kGroup, grid_, limits_, known_(), candidates_(), filtered_()); }
 
 void Stages::find_candidates() {
+  counts_.resize(COUNTS);
   commands_.run("candidates", "find_candidates", chunks(grid_.size_i) * grid_.words_k * grid_.size_j, kGroup, grid_, observed_(),
-                candidates_());
+                candidates_(), counts_());
 }
 
 void Stages::settle_by_recent_views() {
@@ -240,7 +239,7 @@ void Stages::settle_by_recent_views() {
     const std::size_t words = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k, group = large_group();
     tile_views_.resize(words * (64 / VIEW_TILE_K) * views_.view_groups());
     commands_.run(stage, "settle_candidates", words * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
-                  static_cast<cl_int>(count), views_.depths(), views_.block_depths(), layer_depth_(), tile_views_(), candidates_());
+                  static_cast<cl_int>(count), views_.depths(), layer_depth_(), tile_views_(), candidates_());
   }
   list_candidates();
   tile_views_.resize(1);

@@ -27,7 +27,8 @@ class Stages {
 
   void observe_space();    ///< C~
   void find_candidates();  ///< voxels for new surfels by C~
-  /// Notes which surfels must be split, removed, those in observed space, and of the others labelled. Voxels of these are no candidates.
+  /// After find_candidates(). Notes which surfels must be split, removed, those in observed space, and of the others labelled. Voxels of
+  /// these are no candidates.
   /// @return surfels that touch the grid
   std::size_t select_in_view();
   std::size_t split_surfels();                         ///< @return surfels that this adds to the map

@@ -43,7 +43,6 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       changed_(commands),
       page_block_(commands),
       pages_list_(commands),
-      page_cells_list_(commands),
       cell_pages_list_(commands),
       histogram_(commands),
       cell_begin_(commands),
@@ -51,7 +50,6 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       missing_(commands),
       order_(commands),
       new_pages_(commands),
-      new_blocks_(commands),
       changes_(commands),
       empty_(commands),
       changed_slots_(commands),
@@ -105,7 +103,6 @@ void SurfelMap::list_window() {
     cell_pages_.push_back(static_cast<cl_uint>(window_pages_.size()));
   }
   pages_list_.send(window_pages_);
-  page_cells_list_.send(page_cells_);
   cell_pages_list_.send(cell_pages_);
 }
 
@@ -139,8 +136,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   const auto n = static_cast<cl_uint>(count), cell_count = static_cast<cl_uint>(window_.cells());
   const std::size_t bins = SORT_CHUNKS * window_.cells();
   histogram_.resize(bins + 1);
-  histogram_.fill(stage, 0, bins);
-  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, histogram_());
+  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, cell_count, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   count_free(stage);
   cell_begin_.resize(cell_count + 1);
@@ -151,8 +147,8 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), n, histogram_(), order_());
   add_pages(stage, missing_.read(cell_count));
 
-  commands_.run(stage, "fill_pages", window_pages(), kGroup, pages_list_(), page_cells_list_(), static_cast<cl_uint>(window_pages()),
-                cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_());
+  commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), static_cast<cl_uint>(window_pages()),
+                page_block_(), cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_());
   size_ += count;
 }
 
@@ -166,20 +162,15 @@ void SurfelMap::count_free(const char* stage) {
 /// @param missing  pages that each cell's block needs
 void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing) {
   grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
-  std::vector<Page> pages;
-  std::vector<cl_int4> blocks;
+  std::vector<cl_int4> pages;
   for (std::size_t cell = 0; cell < missing.size(); ++cell) {
     const BlockKey block = window_.block(static_cast<int>(cell));
-    for (cl_uint n = 0; n < missing[cell]; ++n) {
-      pages.push_back(index_.add_page(block));
-      blocks.push_back({{block.x, block.y, block.z, 0}});
-    }
+    for (cl_uint n = 0; n < missing[cell]; ++n) pages.push_back({{block.x, block.y, block.z, static_cast<cl_int>(index_.add_page(block))}});
   }
   if (pages.empty()) return;
   const auto count = static_cast<cl_uint>(pages.size());
   new_pages_.send(std::move(pages));
-  new_blocks_.send(std::move(blocks));
-  commands_.run(stage, "begin_new_pages", count, kGroup, new_pages_(), new_blocks_(), count, alive_(), changed_(), page_block_());
+  commands_.run(stage, "begin_new_pages", count, kGroup, new_pages_(), count, alive_(), changed_(), page_block_());
   list_window();
   count_free(stage);
 }

@@ -112,11 +112,11 @@ class SurfelMap {
   MapWindow window_;
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
-  DeviceArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_;
+  DeviceArray<cl_uint> pages_list_, cell_pages_list_;
 
   // Insertion
-  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_, new_pages_;
-  DeviceArray<cl_int4> new_blocks_;
+  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
+  DeviceArray<cl_int4> new_pages_;
 
   // Changes
   DeviceArray<cl_ulong> changes_;

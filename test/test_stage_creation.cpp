@@ -162,6 +162,7 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   scene.current = {random_image(camera, Content::all_valid, random), T_world_start};
   probe.stages().begin_frame(scene.current.image, T_world_start, 5);
   scene.observed = random_field(probe.grid(), 0.2, random);
+  probe.stages().find_candidates();
   probe.stages().select_in_view();
   probe.stages().split_surfels();
   Field<char> candidates = random_field(probe.grid(), density, random);

@@ -72,6 +72,7 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   const std::vector<Surfel> map = probe.map().download();
   if (count > 10) probe.kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
   probe.stages().begin_frame(view.image, view.T_world_camera, 2);
+  probe.stages().find_candidates();
   const Field<char> observed = random_field(probe.grid(), density, random);
   probe.set_observed(observed);
   const Field<char> candidates = random_field(probe.grid(), 0.5, random);
@@ -141,6 +142,7 @@ TEST(StageRemoval, FreesSlots) {
     if (count > 64) probe.kill(some_slots(probe.map().download(), 20));
     probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 9);
     probe.stages().observe_space();  // nothing: no surfel is at a surface
+    probe.stages().find_candidates();
     probe.stages().select_in_view();
     probe.stages().split_surfels();
     std::map<std::uint32_t, Surfel> expected;

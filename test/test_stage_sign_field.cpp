@@ -101,6 +101,7 @@ std::vector<ViewSurfel> put_into_map(const Camera& camera, StagesProbe& probe, s
     if (surfels[n].ragged != 0) probe.make_ragged({slots[n]});
   }
   probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
+  probe.stages().find_candidates();
   probe.stages().select_in_view();
   for (const ViewSurfel& placed : probe.place_surfels()) {
     ViewSurfel& meant = *by_slot.at(placed.slot);

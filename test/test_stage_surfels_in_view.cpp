@@ -61,6 +61,7 @@ struct Scene {
     probe.kill(dead);
     probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 7);
     probe.stages().observe_space();  // nothing: no surfel is at a surface
+    probe.stages().find_candidates();
   }
   SeenSurfel seen(const Surfel& surfel) const { return see(grid, T_world_camera.inverse(), surfel); }
 };
