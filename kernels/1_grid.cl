@@ -93,12 +93,12 @@ INLINE int highest_bit(ulong bits) { return 63 - (int)clz(bits); }
 // Bits of the word's layers that exist; the last word may have fewer than 64.
 INLINE ulong valid_layers(const Grid* g, int w) { return bit_run(0, g->size_k - 64 * w); }
 
-INLINE float3 transform_point(const Transform* T, float3 p) {
-  return (float3)(T->r00 * p.x + T->r01 * p.y + T->r02 * p.z + T->t0, T->r10 * p.x + T->r11 * p.y + T->r12 * p.z + T->t1,
-                  T->r20 * p.x + T->r21 * p.y + T->r22 * p.z + T->t2);
+INLINE float3 rotate(const Transform* T, float3 v) {
+  return (float3)(fma(v.x, T->r00, fma(v.y, T->r01, v.z * T->r02)), fma(v.x, T->r10, fma(v.y, T->r11, v.z * T->r12)),
+                  fma(v.x, T->r20, fma(v.y, T->r21, v.z * T->r22)));
 }
 
-INLINE float3 rotate(const Transform* T, float3 v) {
-  return (float3)(T->r00 * v.x + T->r01 * v.y + T->r02 * v.z, T->r10 * v.x + T->r11 * v.y + T->r12 * v.z,
-                  T->r20 * v.x + T->r21 * v.y + T->r22 * v.z);
+INLINE float3 transform_point(const Transform* T, float3 p) {
+  return (float3)(fma(p.x, T->r00, fma(p.y, T->r01, fma(p.z, T->r02, T->t0))), fma(p.x, T->r10, fma(p.y, T->r11, fma(p.z, T->r12, T->t1))),
+                  fma(p.x, T->r20, fma(p.y, T->r21, fma(p.z, T->r22, T->t2))));
 }
