@@ -111,7 +111,7 @@ typedef struct {
   float block_size;                         // edge of a block, a power of two [m]
 } Window;
 
-// A kept view: what its camera sees of this frame's, and where its depths, and the largest depths of its blocks, start in their pools.
+// A kept view: what its camera sees of this frame's, and where its depths, and the largest depths of its blocks, start in the pool.
 typedef struct {
   Transform to_image;  // this frame's camera -> (x, y, z): in the view's camera at depth z, in column x / z and row y / z, rounded down
   SHARED_INT width, height;

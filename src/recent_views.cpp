@@ -102,6 +102,8 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   const std::vector<float> blocks = find_block_depths(image);
   const std::size_t pixels = depths.size();
   depths.insert(depths.end(), blocks.begin(), blocks.end());
+  constexpr std::size_t kSquare = VIEW_SQUARE * VIEW_SQUARE;
+  depths.resize((depths.size() + kSquare - 1) / kSquare * kSquare);  // the squares of the next room must not lie across lines of the cache
   if (depths.size() > room_size_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
     clear(kept_.empty() && complete_);

@@ -14,7 +14,7 @@ constexpr std::size_t kGroup = 64;
 constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
 constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
 constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead; on a CPU as many as there are, which cost
-                                            // nothing until they are touched
+                                            // nothing, or a page of the system, until they are touched
 constexpr double kLargestRadius = 4;        // [block]; the window, around all that surfels may reach, must not become large without end
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
@@ -84,11 +84,12 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   const double margin = window_margin(grid);
   largest_radius_ = std::max(largest_radius_, largest_created(grid));
   window_ = MapWindow(grid, T_world_camera, block_size_, margin, {largest_radius_, thickness_});
+  cell_has_new_.assign(window_.cells(), false);
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
 
-/// The window's pages by cell. Pages that insert() adds are at the end of their cell's.
+/// The window's pages by cell. Pages that insert() adds are at the end of their cell's, and listed wherever that is.
 void SurfelMap::list_window() {
   window_pages_.clear();
   page_cells_.clear();
@@ -96,7 +97,7 @@ void SurfelMap::list_window() {
   for (int cell = 0; cell < window_.cells(); ++cell) {
     const BlockKey block = window_.block(cell);
     const BlockIndex::Pages* pages = index_.find(block);
-    if (pages != nullptr && window_.meets_grid(block)) {
+    if (pages != nullptr && (cell_has_new_[cell] || window_.meets_grid(block))) {
       window_pages_.insert(window_pages_.end(), pages->begin(), pages->end());
       page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
     }
@@ -165,6 +166,7 @@ void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing
   std::vector<cl_int4> pages;
   for (std::size_t cell = 0; cell < missing.size(); ++cell) {
     const BlockKey block = window_.block(static_cast<int>(cell));
+    if (missing[cell] > 0) cell_has_new_[cell] = true;
     for (cl_uint n = 0; n < missing[cell]; ++n) pages.push_back({{block.x, block.y, block.z, static_cast<cl_int>(index_.add_page(block))}});
   }
   if (pages.empty()) return;
@@ -288,7 +290,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
     Surfel kept = surfel;
     kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size_));
     packed[slots.back()] = pack(kept, block, block_size_);
-    largest = std::max<double>(largest, kept.radius);
+    largest = std::max<double>(largest, unpack(packed[slots.back()], block, block_size_).radius);  // it has been rounded
   }
   grow(std::max(alive.size(), index_.end()));
   close_window();

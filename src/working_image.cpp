@@ -14,7 +14,7 @@ void check_depth(const DepthImage& image, const Config& config) {
   if (image.width < config.decimation || image.height < config.decimation)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
                    std::to_string(config.decimation) + "; lower decimation.");
-  constexpr int kLargest = 16384;  // footprints are 16-bit, sums of pixels 32-bit
+  constexpr int kLargest = 16384;  // the cuboid's tables have 16 bits
   if (image.width > kLargest || image.height > kLargest)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
                    size_text(kLargest, kLargest) + ".");

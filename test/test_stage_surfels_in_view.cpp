@@ -353,6 +353,33 @@ TEST(StageSurfelsInView, Split) {
   EXPECT_GE(most_levels, 3) << "nothing was tested";
 }
 
+/// What is found out of the surfels of a frame that splits some is as if they had been small before.
+TEST(StageSurfelsInView, NothingIsLeftOfParents) {
+  std::size_t added = 0, removed = 0;
+  for (const Camera& camera : cameras()) {
+    SCOPED_TRACE(camera.name);
+    Scene scene(camera, 300, 1, 20, 8);
+    StagesProbe& probe = scene.probe;
+    Random random(9);
+    probe.stages().begin_frame(random_image(camera, Content::mixed, random), scene.T_world_camera, 8);
+    probe.stages().observe_space();
+    probe.stages().find_candidates();
+    probe.stages().select_in_view();
+    added += probe.stages().split_surfels();
+    const auto candidates = probe.candidates();
+    const auto in_view = probe.in_view_words(), removed_words = probe.removed_words();
+    probe.stages().find_candidates();
+    const std::size_t count = probe.stages().select_in_view();
+    EXPECT_EQ(count, probe.in_view_slots().size());
+    EXPECT_TRUE(in_view == probe.in_view_words());
+    EXPECT_TRUE(removed_words == probe.removed_words());
+    EXPECT_TRUE(candidates.values == probe.candidates().values);
+    removed += probe.slots_of(removed_words).size();
+  }
+  EXPECT_GT(added, small_tests() ? 10u : 100u) << "nothing was tested";
+  EXPECT_GT(removed, small_tests() ? 0u : 10u) << "nothing was tested";
+}
+
 TEST(StageSurfelsInView, SplitDoesNotDependOnThreads) {
   const auto one_thread = one_thread_commands();
   if (one_thread == nullptr) GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
