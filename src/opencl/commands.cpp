@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 
 #include "opencl/kernel_files.hpp"
 
@@ -44,6 +45,15 @@ cl::Program build(const Device& device) {
   return program;
 }
 
+/// PoCL's threads may still be letting go of the last command when finish() returns, and look into its queue for that: queues, which are
+/// small, are kept for as long as the process lives.
+void retire(const cl::CommandQueue& queue, const Device& device) {
+  static std::mutex mutex;
+  static auto* const retired = new std::vector<std::pair<cl::CommandQueue, Device>>;  // drivers may be gone before it could be destroyed
+  const std::lock_guard<std::mutex> lock(mutex);
+  retired->emplace_back(queue, device);
+}
+
 }  // namespace
 
 Commands::Commands(Device device) : device_(std::move(device)) {
@@ -64,6 +74,7 @@ Commands::~Commands() {
   } catch (const cl::Error&) {
     // The device is lost: nothing reads any more.
   }
+  retire(queue_, device_);
 }
 
 void Commands::finish() {
