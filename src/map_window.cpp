@@ -89,10 +89,12 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
     p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
   const auto x = p.col(0), y = p.col(1), z = p.col(2);
   const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
-  const double reach = std::max(2 * extent_.largest_radius / voxel_low, extent_.thickness) + 1.6;  // [voxel]; a tenth for rounding
+  constexpr double kRounded = 1.001, kMore = 1.6;  // radii are kept with 11 bits; [voxel], a tenth of it for rounding in the kernel
+  const double reach = std::max(2 * kRounded * extent_.largest_radius / voxel_low, extent_.thickness) + kMore;  // [voxel]
   if (z.maxCoeff() < -(grid_.padding_k + reach) * grid_.delta_min) return false;
   // Surfels reach the further, the deeper they are, but not as fast as depth grows.
-  if (2 * (extent_.thickness + 1.6) < grid_.f && z.minCoeff() > std::max<double>(grid_.z_max, z_far_) + 2 * reach * voxel_low) return false;
+  if (2 * (extent_.thickness + kMore) < grid_.f && z.minCoeff() > std::max<double>(grid_.z_max, z_far_) + 2 * reach * voxel_low)
+    return false;
   return !is_beside({grid_.fx, grid_.center_i, double(grid_.size_i)}, x, z, grid_.z_min, reach) &&
          !is_beside({grid_.fy, grid_.center_j, double(grid_.size_j)}, y, z, grid_.z_min, reach);
 }

@@ -84,7 +84,11 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   const double margin = window_margin(grid);
   largest_radius_ = std::max(largest_radius_, largest_created(grid));
   window_ = MapWindow(grid, T_world_camera, block_size_, margin, {largest_radius_, thickness_});
-  cell_has_new_.assign(window_.cells(), false);
+  listed_cells_.clear();
+  for (int cell = 0; cell < window_.cells(); ++cell) {
+    const BlockKey block = window_.block(cell);
+    listed_cells_.push_back(index_.find(block) != nullptr && window_.meets_grid(block));
+  }
   list_window();
   commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
@@ -95,10 +99,9 @@ void SurfelMap::list_window() {
   page_cells_.clear();
   cell_pages_.assign(1, 0);
   for (int cell = 0; cell < window_.cells(); ++cell) {
-    const BlockKey block = window_.block(cell);
-    const BlockIndex::Pages* pages = index_.find(block);
-    if (pages != nullptr && (cell_has_new_[cell] || window_.meets_grid(block))) {
-      window_pages_.insert(window_pages_.end(), pages->begin(), pages->end());
+    if (listed_cells_[cell]) {
+      const BlockIndex::Pages& pages = *index_.find(window_.block(cell));
+      window_pages_.insert(window_pages_.end(), pages.begin(), pages.end());
       page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
     }
     cell_pages_.push_back(static_cast<cl_uint>(window_pages_.size()));
@@ -166,7 +169,7 @@ void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing
   std::vector<cl_int4> pages;
   for (std::size_t cell = 0; cell < missing.size(); ++cell) {
     const BlockKey block = window_.block(static_cast<int>(cell));
-    if (missing[cell] > 0) cell_has_new_[cell] = true;
+    if (missing[cell] > 0) listed_cells_[cell] = true;
     for (cl_uint n = 0; n < missing[cell]; ++n) pages.push_back({{block.x, block.y, block.z, static_cast<cl_int>(index_.add_page(block))}});
   }
   if (pages.empty()) return;
@@ -290,7 +293,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
     Surfel kept = surfel;
     kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size_));
     packed[slots.back()] = pack(kept, block, block_size_);
-    largest = std::max<double>(largest, unpack(packed[slots.back()], block, block_size_).radius);  // it has been rounded
+    largest = std::max<double>(largest, kept.radius);
   }
   grow(std::max(alive.size(), index_.end()));
   close_window();

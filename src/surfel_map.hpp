@@ -112,7 +112,7 @@ class SurfelMap {
   MapWindow window_;
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
-  std::vector<bool> cell_has_new_;                ///< pages that this frame has added
+  std::vector<bool> listed_cells_;                ///< whose blocks have pages, and meet the grid or have got some in this frame
   DeviceArray<cl_uint> pages_list_, cell_pages_list_;
 
   // Insertion
