@@ -36,7 +36,7 @@ namespace frontier_surfels {
 
 // So many candidates, or views, one work item handles at once, as vectors of 16; and the numbers that a view then has.
 #define LANES 16
-#define VIEW_LANE_FIELDS 18
+#define VIEW_LANE_FIELDS 19
 
 // Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels.
 #define SIGN_FIELD_ONE 256

@@ -98,8 +98,8 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
 }
 
 // Where pixels of a view's image are (0_shared.h).
-INLINE uint16 view_pixels(const View* view, uint16 column, uint16 row) {
-  const uint columns = ((uint)view->width + VIEW_SQUARE - 1) / VIEW_SQUARE;
+INLINE uint16 view_pixels(uint16 width, uint16 column, uint16 row) {
+  const uint16 columns = (width + VIEW_SQUARE - 1) / VIEW_SQUARE;
   const uint16 square = row / VIEW_SQUARE * columns + column / VIEW_SQUARE;
   return (square * VIEW_SQUARE + row % VIEW_SQUARE) * VIEW_SQUARE + column % VIEW_SQUARE;
 }
@@ -110,7 +110,7 @@ INLINE int16 sees(const View* view, __global const float* depths, Points q, int1
   const float16 scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
   const int16 seen = asked & (q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
   if (lane_bits(seen) == 0) return 0;
-  const uint16 pixel = view_pixels(view, convert_uint16(s), convert_uint16(t));
+  const uint16 pixel = view_pixels((uint)view->width, convert_uint16(s), convert_uint16(t));
   return seen & (q.z < gather(depths + view->first_pixel, seen ? as_int16(pixel) : 0));
 }
 

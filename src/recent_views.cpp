@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace frontier_surfels {
 namespace {
@@ -46,28 +47,29 @@ Eigen::Matrix3d projection(const Intrinsics& camera) {
 }
 
 /// Puts a view into its lane of a group.
-void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, float* lane) {
+void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, std::uint32_t first_pixel, float* lane) {
   const Eigen::Matrix3d R = T_view_camera.linear();
   const Eigen::Vector3d t = T_view_camera.translation();
-  const double fields[VIEW_LANE_FIELDS] = {R(0, 0),
-                                           R(0, 1),
-                                           R(0, 2),
-                                           R(1, 0),
-                                           R(1, 1),
-                                           R(1, 2),
-                                           R(2, 0),
-                                           R(2, 1),
-                                           R(2, 2),
-                                           t.x(),
-                                           t.y(),
-                                           t.z(),
-                                           camera.fx,
-                                           camera.fy,
-                                           camera.cx,
-                                           camera.cy,
-                                           static_cast<double>(camera.width),
-                                           static_cast<double>(camera.height)};
-  for (int n = 0; n < VIEW_LANE_FIELDS; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
+  const double fields[VIEW_LANE_FIELDS - 1] = {R(0, 0),
+                                               R(0, 1),
+                                               R(0, 2),
+                                               R(1, 0),
+                                               R(1, 1),
+                                               R(1, 2),
+                                               R(2, 0),
+                                               R(2, 1),
+                                               R(2, 2),
+                                               t.x(),
+                                               t.y(),
+                                               t.z(),
+                                               camera.fx,
+                                               camera.fy,
+                                               camera.cx,
+                                               camera.cy,
+                                               static_cast<double>(camera.width),
+                                               static_cast<double>(camera.height)};
+  for (int n = 0; n < VIEW_LANE_FIELDS - 1; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
+  std::memcpy(&lane[(VIEW_LANE_FIELDS - 1) * LANES], &first_pixel, sizeof(first_pixel));
 }
 
 /// The kept views in an order in which each is far from those before it: what is still unknown after a few is unknown to most, and what is
@@ -135,8 +137,9 @@ int RecentViews::prepare() {
   for (const std::size_t number : spread(kept_.size())) {
     const Kept& kept = kept_[number];
     const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
-    set_lane(T_view_camera, kept.intrinsics, &lanes[views.size() / LANES * VIEW_LANE_FIELDS * LANES + views.size() % LANES]);
+    const std::size_t n = views.size();
     views.push_back(to_view(kept, T_view_camera));
+    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
   }
   views_.resize(std::max<std::size_t>(config_.recent_views, 1));
   views_.send(std::move(views));

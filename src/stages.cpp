@@ -112,7 +112,7 @@ void Stages::set_grid(const WorkingImage& image) {
 void Stages::allocate_grid() {
   observed_.allocate(words() + LANES);  // vectors are read beyond the last row's end
   filtered_.allocate(words());
-  candidates_.allocate(words());
+  candidates_.allocate(words() + LANES);
 }
 
 /// What only section 4 of the method needs, and not before it does: half of the memory.
