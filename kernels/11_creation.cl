@@ -1,24 +1,22 @@
 // Creation - paper 3.5, eq. (14)-(16): a surfel at the centre of each candidate that has a normal.
 
-// New surfel filter. One work item a listed candidate: those that are known, or whose directions cancel, make no surfel.
-//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left;  known: K~, where it has been computed
-//   out kept[count]: 1 or 0
+// New surfel filter. One work item a chunk of LANES listed candidates: those that are known, or whose directions cancel, make no surfel.
+//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left, as 32-bit halves;  known: K~, where it has
+//       been computed
+//   out kept[words]: a bit for each that makes one, as 16-bit quarters
 __kernel void filter_candidates(const Limits limits, __global const int* voxels, const int count, __global const float* directions,
-                                __global const ulong* candidates, const int has_known, __global const ulong* known, __global uint* kept) {
-  const int n = get_global_id(0);
-  if (n >= count) return;
-  const int word = voxels[n] / 64, bit = voxels[n] % 64;
-  __global const float* direction = directions + n / LANES * 3 * LANES + n % LANES;
-  const bool has_normal = length((float3)(direction[0], direction[LANES], direction[2 * LANES])) >= limits.normal_min;
-  const ulong open = has_known ? candidates[word] & ~known[word] : candidates[word];
-  kept[n] = has_normal && (open >> bit & 1) != 0 ? 1 : 0;
-}
-
-// One work item a listed candidate.
-//   in  offsets[count + 1]: prefix sum of filter_candidates' kept;   out created: the numbers of those that are
-__kernel void list_kept(__global const uint* offsets, const int count, __global int* created) {
-  const int n = get_global_id(0);
-  if (n < count && offsets[n + 1] > offsets[n]) created[offsets[n]] = n;
+                                __global const int* candidates, const int has_known, __global const int* known, __global ushort* kept) {
+  const int chunk = get_global_id(0);
+  if (chunk * LANES >= count) {
+    if (chunk < 64 / LANES * ((count + 63) / 64)) kept[chunk] = 0;  // the rest of the last word
+    return;
+  }
+  int16 exist;
+  const int16 numbers = load_chunk(voxels, count, chunk, &exist), at = numbers / 32, bit = (int16)(1) << numbers % 32;
+  const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
+  int16 open = exist & ((gather_int(candidates, at) & bit) != 0) & (lengths(direction) >= limits.normal_min);
+  if (has_known) open &= (gather_int(known, at) & bit) == 0;
+  kept[chunk] = (ushort)lane_bits(open);
 }
 
 // So far before a surfel, 7/4 of its radius, known space is expected.

@@ -9,6 +9,21 @@ __kernel void count_bits(__global const ulong* words, const uint count, __global
   counts[chunk] = sum;
 }
 
+// One work item: counts and lists at once, where a launch takes longer than the work.
+//   out list[room]: no more than there is room for;  total: of all set bits
+__kernel void list_few_bits(__global const ulong* words, const uint count, __global uint* list, const uint room, __global uint* total) {
+  if (get_global_id(0) > 0) return;
+  uint at = 0;
+  for (uint n = 0; n < count; ++n) {
+    const uint bits = (uint)popcount(words[n]);
+    if (at + bits <= room)
+      for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
+    else
+      at += bits;
+  }
+  *total = at;
+}
+
 // One work item a chunk of SCAN_CHUNK values: their sum.
 __kernel void sum_chunks(__global const uint* values, const uint count, __global uint* chunk_sums) {
   const uint chunk = get_global_id(0);

@@ -77,12 +77,6 @@ __kernel void fill_pages(const Window window, __global const uint* pages, const 
   changed[page] |= taken;
 }
 
-// One work item a page of the window: nothing has changed yet.
-__kernel void begin_pages(__global const uint* pages, const uint count, __global ulong* changed) {
-  const uint n = get_global_id(0);
-  if (n < count) changed[pages[n]] = 0;
-}
-
 // One work item a page that a block has just got.
 //   in  new_pages[count]: x, y, z of the block, w: the page
 __kernel void begin_new_pages(__global const int4* new_pages, const uint count, __global ulong* alive, __global ulong* changed,
@@ -95,8 +89,9 @@ __kernel void begin_new_pages(__global const int4* new_pages, const uint count, 
 }
 
 // One work item a page of the window.
+//   i/o changed: nothing has, for the next frame
 //   out page_block: frame of the last change;  changes[count]: this frame's;  empty[count]: 1 if nothing is left in it
-__kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
+__kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
                            const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
   const uint n = get_global_id(0);
   if (n >= count) return;
@@ -104,6 +99,7 @@ __kernel void finish_pages(__global const uint* pages, const uint count, __globa
   changes[n] = changed[page];
   empty[n] = alive[page] == 0 ? 1 : 0;
   if (changed[page] != 0) page_block[page].w = (int)frame;
+  changed[page] = 0;
 }
 
 // One work item a slot of a list: its surfel, for the host.

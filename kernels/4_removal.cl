@@ -34,7 +34,7 @@ typedef struct {
 //   in  pages[count]: those of the window;  observed: C~, as 32-bit halves;  view: this frame as its own camera sees it, depths: its
 //       image, for the exact test;  depth, column_end: of 2_observed_space
 //   i/o candidates: as 32-bit halves: voxels of surfels that stay are taken off;  changed: those that stay and that 12_labels will label
-//       counts: COUNT_IN_VIEW, COUNT_LARGE
+//       counts: COUNT_IN_VIEW, COUNT_LARGE, COUNT_REMOVED
 //   out in_view[count], large[count], removed[count]
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
@@ -73,22 +73,21 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item > 0 || n >= count) return;
-  const ulong in_view_here = pack_lanes(found->in_view), large_here = pack_lanes(found->large);
+  const ulong in_view_here = pack_lanes(found->in_view), large_here = pack_lanes(found->large), removed_here = pack_lanes(found->removed);
   in_view[n] = in_view_here;
   large[n] = large_here;
-  removed[n] = pack_lanes(found->removed);
+  removed[n] = removed_here;
   changed[page] |= pack_lanes(found->labelled);
   if (in_view_here != 0) atomic_add(&counts[COUNT_IN_VIEW], (uint)popcount(in_view_here));
   if (large_here != 0) atomic_add(&counts[COUNT_LARGE], (uint)popcount(large_here));
+  if (removed_here != 0) atomic_add(&counts[COUNT_REMOVED], (uint)popcount(removed_here));
 }
 
 // One work item a page of the window: slots of removed surfels become free.
-//   i/o counts: COUNT_REMOVED
 __kernel void remove_surfels(__global const uint* pages, const uint count, __global const ulong* removed, __global ulong* alive,
-                             __global ulong* changed, __global uint* counts) {
+                             __global ulong* changed) {
   const uint n = get_global_id(0);
   if (n >= count || removed[n] == 0) return;
-  atomic_add(&counts[COUNT_REMOVED], (uint)popcount(removed[n]));
   alive[pages[n]] &= ~removed[n];
   changed[pages[n]] |= removed[n];
 }

@@ -7,6 +7,8 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kFew = 2048, kFewOfCpu = 65536;  // one more launch would take longer
+constexpr std::size_t kFewWords = 1 << 18;             // on a CPU: two more
+constexpr std::size_t kRoom = 1 << 14;
 
 }  // namespace
 
@@ -41,12 +43,26 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
   if (count == 0) return 0;
   const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
   const auto words = static_cast<cl_uint>(count);
+  if (commands_.device().is_cpu && count <= kFewWords) return list_few_bits(stage, bits, words, list);
   counts_.resize(chunks + 1);
   commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
   const std::uint32_t total = scan(stage, counts_, chunks);
   list.resize(total);
   if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, counts_(), list());
   return total;
+}
+
+/// The list's room is what earlier ones have needed; when it is not enough, all is done again.
+std::uint32_t Lists::list_few_bits(const char* stage, const DeviceArray<cl_ulong>& bits, cl_uint words, DeviceArray<cl_uint>& list) {
+  list.resize(kRoom);
+  counts_.resize(1);
+  for (;;) {
+    const std::size_t room = list.bytes() / sizeof(cl_uint);
+    commands_.run(stage, "list_few_bits", 1, 1, bits(), words, list(), static_cast<cl_uint>(room), counts_());
+    const std::uint32_t total = counts_.read_one(0);
+    if (total <= room) return total;
+    list.resize(total);
+  }
 }
 
 }  // namespace frontier_surfels

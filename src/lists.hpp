@@ -23,6 +23,7 @@ class Lists {
   std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
 
  private:
+  std::uint32_t list_few_bits(const char* stage, const DeviceArray<cl_ulong>& bits, cl_uint words, DeviceArray<cl_uint>& list);
   void scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level);
 
   Commands& commands_;

@@ -141,9 +141,7 @@ int RecentViews::prepare() {
     views.push_back(to_view(kept, T_view_camera));
     set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
   }
-  views_.resize(std::max<std::size_t>(config_.recent_views, 1));
   views_.send(std::move(views));
-  view_lanes_.resize(1);
   view_lanes_.send(std::move(lanes));
   return static_cast<int>(kept_.size());
 }

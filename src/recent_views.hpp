@@ -57,8 +57,8 @@ class RecentViews {
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
   bool complete_;
-  DeviceArray<View> views_;
-  DeviceArray<float> view_lanes_;
+  SentArray<View> views_;
+  SentArray<float> view_lanes_;
   /// [recent_views + 1][room_size_]: the kept views' images and the current one's; behind each the largest depth in each block of
   /// VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
   DeviceArray<float> depths_;

@@ -40,9 +40,9 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       config_(config),
       limits_(make_limits(config)),
       depth_(commands),
+      color_(commands),
       layer_depth_(commands),
       column_end_(commands),
-      color_(commands),
       valid_(commands),
       pixels_i_(commands),
       pixels_j_(commands),
@@ -57,9 +57,9 @@ Stages::Stages(Commands& commands, Lists& lists, const Config& config, SurfelMap
       lines_(commands),
       tile_views_(commands),
       listed_voxels_(commands),
-      kept_offsets_(commands),
-      around_(commands),
       created_(commands),
+      kept_bits_(commands),
+      around_(commands),
       directions_(commands),
       counts_(commands),
       in_view_bits_(commands),
@@ -90,7 +90,6 @@ void Stages::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_w
   T_local_camera_ = to_transform(map_.window().T_camera_local().inverse());
   depth_.send(image.depth);
   has_color_ = !image.color.empty();
-  color_.resize(1);
   color_.send(image.color);
   views_.set_current(image, T_world_camera);
 }
@@ -135,7 +134,7 @@ void Stages::observe_space() {
                 pixels_i_(), pixels_j_(), words_i_(), observed_());
 }
 
-void Stages::visit_surfels() {
+std::vector<cl_uint> Stages::visit_surfels() {
   const char* stage = "in_view";
   const std::size_t pages = map_.window_pages();
   in_view_bits_.resize(pages + 1);
@@ -145,11 +144,13 @@ void Stages::visit_surfels() {
                 static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
                 map_.pages(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(),
                 map_.changed(), in_view_bits_(), large_bits_(), removed_bits_(), counts_());
+  std::vector<cl_uint> counts = counts_.read(COUNTS);
+  removed_ = counts[COUNT_REMOVED];
+  return counts;
 }
 
 std::size_t Stages::select_in_view() {
-  visit_surfels();
-  const std::vector<cl_uint> counts = counts_.read(COUNTS);
+  const std::vector<cl_uint> counts = visit_surfels();
   large_ = counts[COUNT_LARGE];
   return counts[COUNT_IN_VIEW];
 }
@@ -266,13 +267,12 @@ void Stages::list_candidates() {
 
 void Stages::filter_candidates() {
   const char* stage = "creation";
-  const auto count = static_cast<cl_int>(listed_count_);
-  kept_offsets_.resize(listed_count_ + 1);
-  commands_.run(stage, "filter_candidates", listed_count_, kGroup, limits_, listed_voxels_(), count, directions_(), candidates_(),
-                static_cast<cl_int>(is_open()), filtered_(), kept_offsets_());
-  created_count_ = lists_.scan(stage, kept_offsets_, listed_count_);
-  created_.resize(created_count_);
-  if (created_count_ > 0) commands_.run(stage, "list_kept", listed_count_, kGroup, kept_offsets_(), count, created_());
+  const std::size_t words = (listed_count_ + 63) / 64;
+  kept_bits_.resize(words + 1);
+  commands_.run(stage, "filter_candidates", 64 / LANES * words, large_group(), limits_, listed_voxels_(),
+                static_cast<cl_int>(listed_count_), directions_(), candidates_(), static_cast<cl_int>(is_open()), filtered_(),
+                kept_bits_());
+  created_count_ = lists_.list_bits(stage, kept_bits_, words, created_);
 }
 
 std::size_t Stages::remove_surfels() {
@@ -282,10 +282,9 @@ std::size_t Stages::remove_surfels() {
   new_cells_.resize(created_count_);
   const std::size_t pages = map_.window_pages();
   commands_.run(stage, "remove_surfels", pages, kGroup, map_.pages(), static_cast<cl_uint>(pages), removed_bits_(), map_.alive(),
-                map_.changed(), counts_());
-  const std::size_t count = counts_.read_one(COUNT_REMOVED);
-  map_.removed(count);
-  return count;
+                map_.changed());
+  map_.removed(removed_);
+  return removed_;
 }
 
 std::size_t Stages::create_surfels() {

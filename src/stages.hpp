@@ -53,7 +53,7 @@ class Stages {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;
   }
-  void visit_surfels();
+  std::vector<cl_uint> visit_surfels();  ///< @return the counts
   void place_surfels();
   void list_candidates();  ///< and the direction to the observed space around each
   void set_grid(const WorkingImage& image);
@@ -76,12 +76,13 @@ class Stages {
   Window window_ = {};
   std::uint32_t frame_ = 0;
   bool has_color_ = false;
-  std::size_t large_ = 0, in_view_ = 0, listed_count_ = 0, created_count_ = 0;
+  std::size_t large_ = 0, removed_ = 0, in_view_ = 0, listed_count_ = 0, created_count_ = 0;
 
   // Image and grid
-  DeviceArray<float> depth_, layer_depth_;
+  SentArray<float> depth_;
+  SentArray<cl_uint> color_;
+  DeviceArray<float> layer_depth_;
   DeviceArray<cl_int> column_end_;
-  DeviceArray<cl_uint> color_;
   DeviceArray<cl_ushort> valid_;
   DeviceArray<PixelRange> pixels_i_, pixels_j_, words_i_;
 
@@ -91,8 +92,9 @@ class Stages {
   DeviceArray<cl_ushort> tile_views_;
 
   // Candidates as a list, and new surfels
-  DeviceArray<cl_uint> listed_voxels_, kept_offsets_;
-  DeviceArray<cl_int> around_, created_;
+  DeviceArray<cl_uint> listed_voxels_, created_;
+  DeviceArray<cl_ulong> kept_bits_;
+  DeviceArray<cl_int> around_;
   DeviceArray<float> directions_;
 
   // Surfels in view

@@ -90,24 +90,26 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
     listed_cells_.push_back(index_.find(block) != nullptr && window_.meets_grid(block));
   }
   list_window();
-  commands_.run("in_view", "begin_pages", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), changed_());
 }
 
 /// The window's pages by cell. Pages that insert() adds are at the end of their cell's, and listed wherever that is.
 void SurfelMap::list_window() {
-  window_pages_.clear();
-  page_cells_.clear();
+  std::vector<Page> pages;
+  std::vector<cl_uint> page_cells;
   cell_pages_.assign(1, 0);
   for (int cell = 0; cell < window_.cells(); ++cell) {
     if (listed_cells_[cell]) {
-      const BlockIndex::Pages& pages = *index_.find(window_.block(cell));
-      window_pages_.insert(window_pages_.end(), pages.begin(), pages.end());
-      page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
+      const BlockIndex::Pages& own = *index_.find(window_.block(cell));
+      pages.insert(pages.end(), own.begin(), own.end());
+      page_cells.resize(pages.size(), static_cast<cl_uint>(cell));
     }
-    cell_pages_.push_back(static_cast<cl_uint>(window_pages_.size()));
+    cell_pages_.push_back(static_cast<cl_uint>(pages.size()));
   }
-  pages_list_.send(window_pages_);
+  close_window();  // nothing is listed if the list cannot be sent
+  pages_list_.send(pages);
   cell_pages_list_.send(cell_pages_);
+  window_pages_ = std::move(pages);
+  page_cells_ = std::move(page_cells);
 }
 
 /// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
@@ -303,6 +305,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   for (; alive.size() < before; blocks.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) alive.push_back(0);
   surfels_.write(packed);
   alive_.write(alive);
+  changed_.write(std::vector<cl_ulong>(alive.size(), 0));  // a frame that failed may have left something there
   page_block_.write(blocks);
   index_ = std::move(index);
   size_ = surfels.size();
@@ -355,6 +358,7 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
     const Page page = index_.add_page(block);
     surfels_.write(some, PAGE_SLOTS * page);
     alive_.write({some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1}, page);
+    changed_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
   }
   size_ += surfels.size();

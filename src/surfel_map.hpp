@@ -113,11 +113,11 @@ class SurfelMap {
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
   std::vector<bool> listed_cells_;                ///< whose blocks have pages, and meet the grid or have got some in this frame
-  DeviceArray<cl_uint> pages_list_, cell_pages_list_;
+  SentArray<cl_uint> pages_list_, cell_pages_list_;
 
   // Insertion
   DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
-  DeviceArray<cl_int4> new_pages_;
+  SentArray<cl_int4> new_pages_;
 
   // Changes
   DeviceArray<cl_ulong> changes_;

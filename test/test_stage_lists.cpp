@@ -57,5 +57,22 @@ TEST(StageLists, SetBitsInOrder) {
   }
 }
 
+/// So many words that a CPU, too, counts before it lists.
+TEST(StageLists, SetBitsOfManyWords) {
+  Random random(3);
+  StagesProbe probe({});
+  for (const std::size_t size : {std::size_t{1} << 18, (std::size_t{1} << 18) + 1, std::size_t{1} << 19}) {
+    std::vector<std::uint64_t> words(size, 0);
+    std::vector<std::uint32_t> expected;
+    for (std::size_t n = 0; n < size; ++n) {
+      if (!random.chance(0.1)) continue;
+      words[n] = random.chance(0.5) ? ~std::uint64_t{0} : std::uint64_t{1} << n % 64;
+      for (std::size_t bit = 0; bit < 64; ++bit)
+        if (words[n] >> bit & 1) expected.push_back(static_cast<std::uint32_t>(64 * n + bit));
+    }
+    EXPECT_TRUE(probe.list_bits(words) == expected) << size << " words";
+  }
+}
+
 }  // namespace
 }  // namespace frontier_surfels

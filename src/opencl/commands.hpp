@@ -51,6 +51,7 @@ class Commands {
 
   std::size_t most_bytes() const { return most_bytes_; }  ///< that a buffer may have
   cl::Buffer allocate(std::size_t bytes);
+  void allocated(std::size_t bytes) { allocated_bytes_ += bytes; }
   void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
   std::size_t allocated_bytes() const { return allocated_bytes_; }
 
@@ -127,6 +128,39 @@ class DeviceArray {
   Commands* commands_;
   cl::Buffer buffer_;
   std::size_t capacity_ = 0;
+};
+
+/// Values of T that the host gives anew with every frame, for kernels to read. A device that shares the host's memory reads them where they
+/// are: that saves a command, which costs more than what is copied.
+template <typename T>
+class SentArray {
+ public:
+  explicit SentArray(Commands& commands) : commands_(&commands), array_(commands) {}
+  ~SentArray() { commands_->release(shared_bytes()); }
+  SentArray(const SentArray&) = delete;
+  SentArray& operator=(const SentArray&) = delete;
+
+  void send(std::vector<T> values) {
+    if (values.empty()) values.resize(1);  // there are no empty buffers
+    if (!commands_->device().shares_memory) return array_.send(std::move(values));
+    auto shared = std::make_shared<std::vector<T>>(std::move(values));
+    commands_->keep(shared);
+    commands_->keep(shared_);  // what runs may still read what was sent before
+    buffer_ = cl::Buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, shared->size() * sizeof(T), shared->data());
+    commands_->release(shared_bytes());
+    shared_ = std::move(shared);
+    commands_->allocated(shared_bytes());
+  }
+
+  const cl::Buffer& operator()() const { return commands_->device().shares_memory ? buffer_ : array_(); }
+
+ private:
+  std::size_t shared_bytes() const { return shared_ == nullptr ? 0 : shared_->size() * sizeof(T); }
+
+  Commands* commands_;
+  DeviceArray<T> array_;  ///< of a device with a memory of its own
+  std::shared_ptr<const std::vector<T>> shared_;
+  cl::Buffer buffer_;  ///< of what it shares
 };
 
 }  // namespace frontier_surfels

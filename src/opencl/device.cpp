@@ -108,6 +108,7 @@ Device choose_device(const Config& config) {
       Device chosen;
       chosen.device = limit_threads(candidate.device, config.threads);
       chosen.context = cl::Context(chosen.device);
+      chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
       chosen.is_cpu = chosen.device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU;
       chosen.description = describe({candidate.platform, chosen.device});
       return chosen;

@@ -10,7 +10,8 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
-  std::string description;  ///< platform, name and compute units
+  bool shares_memory = false;  ///< with the host
+  std::string description;     ///< platform, name and compute units
 };
 
 /// The device that platform, device_type, device_index and threads ask for.

@@ -183,6 +183,8 @@ class StagesProbe {
   void set_removed_words(const std::vector<std::uint64_t>& words) {
     stages_.removed_bits_.resize(words.size() + 1);
     stages_.removed_bits_.write(words);
+    stages_.removed_ = 0;
+    for (const std::uint64_t word : words) stages_.removed_ += __builtin_popcountll(word);
   }
   std::uint64_t alive_word(std::uint32_t page) const { return peek<cl_ulong>(map_.alive(), page); }
 
