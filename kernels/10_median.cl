@@ -20,11 +20,11 @@ __kernel void median(const Grid g, const Limits limits, __global const ulong* kn
                      __global ulong* filtered) {
   const int word = get_global_id(0);
   if (word >= g.size_i * g.size_j * g.words_k) return;
-  if (candidates[word] == 0) {
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  if (candidates[tile_word_index(&g, i, j, w)] == 0) {
     filtered[word] = 0;
     return;
   }
-  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const ulong layers = valid_layers(&g, w);
 
   ulong plane[5] = {0, 0, 0, 0, 0};

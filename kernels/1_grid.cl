@@ -70,6 +70,16 @@ INLINE bool inside_grid(const Grid* g, int3 v) {
 
 INLINE int word_index(const Grid* g, int i, int j, int w) { return (j * g->words_k + w) * g->size_i + i; }
 
+// Words of candidates lie tile by tile of VIEW_TILE x VIEW_TILE columns, which are asked for, and listed, together; columns beyond the grid
+// have words, too, without a candidate.
+#define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
+
+INLINE int grid_tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }
+INLINE int tile_word_index(const Grid* g, int i, int j, int w) {
+  return ((j / VIEW_TILE * g->words_k + w) * grid_tiles(g->size_i) + i / VIEW_TILE) * TILE_COLUMNS + j % VIEW_TILE * VIEW_TILE +
+         i % VIEW_TILE;
+}
+
 INLINE bool test_bit(const Grid* g, __global const ulong* field, int3 v) {
   return (field[word_index(g, v.x, v.y, v.z >> 6)] >> (v.z & 63)) & 1;
 }

@@ -15,11 +15,11 @@ INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, _
 
 // Takes voxels off the candidates.
 //   at, bit: numbers of 32-bit halves of words, and bits of them
-INLINE void clear_candidates(__global int* candidates, int16 at, int16 bit, int16 asked) {
+INLINE void clear_candidates(__global int* candidates, int16 at, int16 bit, int16 taken) {
   int words[LANES], bits[LANES];
   vstore16(at, 0, words);
   vstore16(bit, 0, bits);
-  for (uint left = lane_bits(asked & ((gather_int(candidates, at) & bit) != 0)); left != 0; left &= left - 1) {
+  for (uint left = lane_bits(taken); left != 0; left &= left - 1) {
     const int n = lowest_lane(left);
     atomic_and(&candidates[words[n]], ~bits[n]);
   }
@@ -59,16 +59,20 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
     const int16 inside = inside_grid16(&g, v) & seen;
     if (lane_bits(inside) != 0) {
       found->large[item] = (ushort)lane_bits(inside & (s.radius / voxel >= limits.split_radius));
-      const int16 at = inside ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + ((v.k >> 5) & 1) : 0;
-      const int16 bit = (int16)(1) << (v.k & 31);
-      int16 stay = inside & ((gather_int(observed, at) & bit) == 0);
+      const int16 bit = (int16)(1) << (v.k & 31), upper = (v.k >> 5) & 1, word = v.j / VIEW_TILE * g.words_k + (v.k >> 6);
+      const int16 column = v.j % VIEW_TILE * VIEW_TILE + v.i % VIEW_TILE;
+      const int16 candidate = inside ? 2 * ((word * grid_tiles(g.size_i) + v.i / VIEW_TILE) * TILE_COLUMNS + column) + upper : 0;
+      const int16 is_candidate = inside & ((gather_int(candidates, candidate) & bit) != 0);
+      // Candidates are not observed: that is asked of the others alone.
+      const int16 rest = inside & ~is_candidate, at = rest ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + upper : 0;
+      int16 stay = is_candidate | (rest & ((gather_int(observed, at) & bit) == 0));
       stay &= ~leaves(&limits, &view, remove_buried, depths, &s, stored_normals(&s, &T_camera_local), stay);
       found->removed[item] = (ushort)lane_bits(inside & ~stay);
       int16 pixel;
       const int16 unlabelled = stay & lacks_label(s.attributes, has_color);
       found->labelled[item] =
           (ushort)lane_bits(at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &pixel));
-      clear_candidates(candidates, at, bit, stay);
+      clear_candidates(candidates, candidate, bit, stay & is_candidate);
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);

@@ -1,13 +1,14 @@
 // Where new surfels may be created - paper 3.5, eq. (13): unobserved voxels beside observed ones. 4_removal takes those off that have a
 // surfel. Whether they are known is asked of the recent views first, and of the surfels only where those leave it open.
 
-// Voxels by their numbers, 64 word + bit.
+// Candidates by their numbers, 64 word + bit.
 INLINE Voxels voxels_of(const Grid* g, int16 numbers) {
-  const int16 words = numbers >> 6, rows = quotients(words, g->size_i);
+  const int16 tiles = numbers / (64 * TILE_COLUMNS), columns = numbers / 64 & (TILE_COLUMNS - 1);
+  const int16 rows = quotients(tiles, grid_tiles(g->size_i)), tiles_j = quotients(rows, g->words_k);
   Voxels v;
-  v.i = words - rows * g->size_i;
-  v.j = quotients(rows, g->words_k);
-  v.k = 64 * (rows - v.j * g->words_k) + (numbers & 63);
+  v.i = VIEW_TILE * (tiles - rows * grid_tiles(g->size_i)) + columns % VIEW_TILE;
+  v.j = VIEW_TILE * tiles_j + columns / VIEW_TILE;
+  v.k = 64 * (rows - tiles_j * g->words_k) + (numbers & 63);
   return v;
 }
 
@@ -79,22 +80,28 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
   vstore16(sum.z, 3 * chunk + 2, directions);
 }
 
-// One work item words of LANES columns.
+// One work item words of LANES columns; of all rows of the tiles.
 //   in  observed: C~, with LANES words to spare;   out candidates: also those that surviving surfels take; 4_removal knows them
 //       counts: 0, for what 4_removal counts next
 __kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
   if (get_global_id(0) < COUNTS) counts[get_global_id(0)] = 0;
   const int chunks = grid_chunks(g.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % g.words_k,
             j = get_global_id(0) / chunks / g.words_k;
-  if (j >= g.size_j) return;
-  __global const ulong* own = observed + word_index(&g, i, j, w);
-  const ulong16 here = vload16(0, own);
-  const int16 has_right = i + lane_numbers() + 1 < g.size_i;
-  const ulong16 left = i > 0 ? vload16(0, own - 1) : (ulong16)(0, here.s0123, here.s4567, here.s89ab, here.scd, here.se);
-  ulong16 beside = here << 1 | here >> 1 | left | (vload16(0, own + 1) & as_ulong16(convert_long16(has_right)));
-  if (w > 0) beside |= vload16(0, own - g.size_i) >> 63;
-  if (w + 1 < g.words_k) beside |= vload16(0, own + g.size_i) << 63;
-  if (j > 0) beside |= vload16(0, own - g.words_k * g.size_i);
-  if (j + 1 < g.size_j) beside |= vload16(0, own + g.words_k * g.size_i);
-  store_words(beside & ~here & valid_layers(&g, w), &g, i, candidates + word_index(&g, i, j, w));
+  if (j >= VIEW_TILE * grid_tiles(g.size_j)) return;
+  ulong16 found = 0;
+  if (j < g.size_j) {
+    __global const ulong* own = observed + word_index(&g, i, j, w);
+    const ulong16 here = vload16(0, own);
+    const int16 columns = i + lane_numbers();
+    const ulong16 left = i > 0 ? vload16(0, own - 1) : (ulong16)(0, here.s0123, here.s4567, here.s89ab, here.scd, here.se);
+    ulong16 beside = here << 1 | here >> 1 | left | (vload16(0, own + 1) & as_ulong16(convert_long16(columns + 1 < g.size_i)));
+    if (w > 0) beside |= vload16(0, own - g.size_i) >> 63;
+    if (w + 1 < g.words_k) beside |= vload16(0, own + g.size_i) << 63;
+    if (j > 0) beside |= vload16(0, own - g.words_k * g.size_i);
+    if (j + 1 < g.size_j) beside |= vload16(0, own + g.words_k * g.size_i);
+    found = beside & ~here & valid_layers(&g, w) & as_ulong16(convert_long16(columns < g.size_i));
+  }
+  __global ulong* row = candidates + tile_word_index(&g, i, j, w);
+  vstore8(found.lo, 0, row);
+  if (i + VIEW_TILE < g.size_i) vstore8(found.hi, 0, row + TILE_COLUMNS);
 }

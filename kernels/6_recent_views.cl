@@ -89,8 +89,6 @@ uint views_of_box(__global const float* lanes, __global const View* views, __glo
   return bits;
 }
 
-#define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
-
 // So many views are asked at first before the candidates left are listed anew.
 #define FIRST_VIEWS 6
 
@@ -117,17 +115,10 @@ INLINE ulong all_bits(ulong8 words) {
   return of_2.x | of_2.y;
 }
 
-// Loads the words of the tiles at tile.z and above.
-//   candidates: with LANES words to spare: what is read beyond a row's end is thrown away
-INLINE void load_words(const Grid* g, int3 tile, __global const ulong* candidates, __local Tile* own) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), i = tile.x * VIEW_TILE;
-  for (int row = lane; row < VIEW_TILE; row += lanes) {
-    const int j = tile.y * VIEW_TILE + row;
-    const long8 exists = convert_long8(i + (int8)(0, 1, 2, 3, 4, 5, 6, 7) < g->size_i);
-    ulong8 words = 0;
-    if (j < g->size_j) words = vload8(0, candidates + word_index(g, i, j, tile.z * VIEW_TILE_K / 64)) & as_ulong8(exists);
-    vstore8(words, row, own->words);
-  }
+// Loads the words of tiles one above the other.
+INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  for (int row = lane; row < VIEW_TILE; row += lanes) vstore8(vload8(row, candidates), row, own->words);
   barrier(CLK_LOCAL_MEM_FENCE);
   if (lane == 0) {
     ulong8 words = 0;
@@ -135,18 +126,6 @@ INLINE void load_words(const Grid* g, int3 tile, __global const ulong* candidate
     own->layers = all_bits(words);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-}
-
-// The other way round.
-INLINE void put_words(const Grid* g, int3 tile, __local const Tile* own, __global ulong* candidates) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), i = tile.x * VIEW_TILE;
-  for (int row = lane; row < VIEW_TILE && tile.y * VIEW_TILE + row < g->size_j; row += lanes) {
-    __global ulong* words = candidates + word_index(g, i, tile.y * VIEW_TILE + row, tile.z * VIEW_TILE_K / 64);
-    if (i + VIEW_TILE <= g->size_i)
-      vstore8(vload8(row, own->words), 0, words);
-    else
-      for (int n = 0; i + n < g->size_i; ++n) words[n] = own->words[row * VIEW_TILE + n];
-  }
 }
 
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
@@ -305,14 +284,14 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
                                 __global ushort* tile_views, __global ulong* candidates) {
   const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + LANES - 1) / LANES;
-  const int group = get_group_id(0), tiles_i = (g.size_i + VIEW_TILE - 1) / VIEW_TILE;
-  int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
+  const int group = get_group_id(0), tiles_i = grid_tiles(g.size_i);
+  __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
   __local Tile own;
-  load_words(&g, tile, candidates, &own);
+  load_words(own_candidates, &own);
   if (own.layers == 0) return;
 
-  const int first_tile = tile.z;
-  for (; tile.z < first_tile + tiles_of_word; ++tile.z) {
+  int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
+  for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
     const uint layers = tile_layers(own.layers, tile);
     if (layers == 0) continue;
     if (lane == 0) {
@@ -337,7 +316,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
     barrier(CLK_LOCAL_MEM_FENCE);
   }
 
-  put_words(&g, (int3)(tile.x, tile.y, first_tile), &own, candidates);
+  for (int row = lane; row < VIEW_TILE; row += lanes) vstore8(vload8(row, own.words), row, own_candidates);
 }
 
 // The kept views that may know something near LANES candidates: those of the tiles that they are in.
@@ -350,7 +329,7 @@ typedef struct {
 
 INLINE ViewsAround views_around(const Grid* g, __global const View* views, __global const ushort* tile_views, int view_groups, Voxels v) {
   ViewsAround around = {views, tile_views, view_groups, {0}, 0};
-  const int tiles_i = (g->size_i + VIEW_TILE - 1) / VIEW_TILE, tiles_k = 64 / VIEW_TILE_K * g->words_k;
+  const int tiles_i = grid_tiles(g->size_i), tiles_k = 64 / VIEW_TILE_K * g->words_k;
   int tiles[LANES];
   vstore16((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
   for (int n = 0; n < LANES; ++n) {
@@ -428,9 +407,9 @@ INLINE void or_word(__global uint* lines, int at, ulong bits) {
 __kernel void mark_lines(const Grid g, __global const ulong* candidates, __global uint* lines) {
   const int word = get_global_id(0);
   if (word >= g.size_i * g.size_j * g.words_k) return;
-  const ulong open = candidates[word];
-  if (open == 0) return;
   const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const ulong open = candidates[tile_word_index(&g, i, j, w)];
+  if (open == 0) return;
   ulong below = 0, here = open, above = 0;  // the bits spread along k, into the words beside as well
   for (int n = 1; n <= LINE_MARGIN; ++n) {
     here |= (open << n) | (open >> n);

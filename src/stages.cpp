@@ -24,6 +24,8 @@ Limits make_limits(const Config& config) {
   return limits;
 }
 
+std::size_t tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }
+
 std::size_t chunks(std::size_t count) { return (count + LANES - 1) / LANES; }
 
 bool same_camera(const Intrinsics& a, const Intrinsics& b) {
@@ -111,7 +113,7 @@ void Stages::set_grid(const WorkingImage& image) {
 void Stages::allocate_grid() {
   observed_.allocate(words() + LANES);  // vectors are read beyond the last row's end
   filtered_.allocate(words());
-  candidates_.allocate(words() + LANES);
+  candidates_.allocate(candidate_words());
 }
 
 /// What only section 4 of the method needs, and not before it does: half of the memory.
@@ -125,6 +127,10 @@ void Stages::allocate_paths() {
 }
 
 std::size_t Stages::image_chunks() const { return 2 * ((grid_.width + 31) / 32) * static_cast<std::size_t>(grid_.height); }
+
+std::size_t Stages::candidate_words() const {
+  return VIEW_TILE * VIEW_TILE * tiles(grid_.size_i) * tiles(grid_.size_j) * static_cast<std::size_t>(grid_.words_k);
+}
 
 void Stages::observe_space() {
   const char* stage = "observed_space";
@@ -228,16 +234,16 @@ void Stages::filter_median() { commands_.run("median", "median", words(), kGroup
 
 void Stages::find_candidates() {
   counts_.resize(COUNTS);
-  commands_.run("candidates", "find_candidates", chunks(grid_.size_i) * grid_.words_k * grid_.size_j, kGroup, grid_, observed_(),
-                candidates_(), counts_());
+  const std::size_t rows = VIEW_TILE * tiles(grid_.size_j);
+  commands_.run("candidates", "find_candidates", chunks(grid_.size_i) * grid_.words_k * rows, kGroup, grid_, observed_(), candidates_(),
+                counts_());
 }
 
 void Stages::settle_by_recent_views() {
   const char* stage = "recent_views";
   const int count = views_.prepare();
   if (count > 0) {
-    const auto up = [](int size) { return static_cast<std::size_t>((size + VIEW_TILE - 1) / VIEW_TILE); };
-    const std::size_t words = up(grid_.size_i) * up(grid_.size_j) * grid_.words_k, group = large_group();
+    const std::size_t words = tiles(grid_.size_i) * tiles(grid_.size_j) * grid_.words_k, group = large_group();
     tile_views_.resize(words * (64 / VIEW_TILE_K) * views_.view_groups());
     commands_.run(stage, "settle_candidates", words * group, group, grid_, limits_.min_gap, views_.views(), views_.view_lanes(),
                   static_cast<cl_int>(count), views_.depths(), layer_depth_(), tile_views_(), candidates_());
@@ -258,7 +264,7 @@ std::size_t Stages::large_group() const { return commands_.device().is_cpu ? 1 :
 
 void Stages::list_candidates() {
   const char* stage = "recent_views";
-  listed_count_ = lists_.list_bits(stage, candidates_, words(), listed_voxels_);
+  listed_count_ = lists_.list_bits(stage, candidates_, candidate_words(), listed_voxels_);
   around_.resize(chunks(listed_count_) * LANES);
   directions_.resize(chunks(listed_count_) * 3 * LANES);
   commands_.run(stage, "find_directions", chunks(listed_count_), large_group(), grid_, layer_depth_(), observed_(), listed_voxels_(),
@@ -269,7 +275,7 @@ void Stages::filter_candidates() {
   const char* stage = "creation";
   const std::size_t words = (listed_count_ + 63) / 64;
   kept_bits_.resize(words + 1);
-  commands_.run(stage, "filter_candidates", 64 / LANES * words, large_group(), limits_, listed_voxels_(),
+  commands_.run(stage, "filter_candidates", 64 / LANES * words, large_group(), grid_, limits_, listed_voxels_(),
                 static_cast<cl_int>(listed_count_), directions_(), candidates_(), static_cast<cl_int>(is_open()), filtered_(),
                 kept_bits_());
   created_count_ = lists_.list_bits(stage, kept_bits_, words, created_);

@@ -49,6 +49,7 @@ class Stages {
   friend class StagesProbe;  // tests read and write the fields between stages
 
   std::size_t words() const { return static_cast<std::size_t>(grid_.size_i) * grid_.size_j * grid_.words_k; }
+  std::size_t candidate_words() const;
   std::size_t line_numbers() const {
     return 2 * static_cast<std::size_t>(grid_.size_i + grid_.size_j) * grid_.words_k +
            static_cast<std::size_t>(grid_.size_i) * grid_.size_j;

@@ -177,11 +177,13 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
   candidates = probe.created();
   probe.set_removed_words(std::vector<std::uint64_t>(probe.window_pages().size(), 0));
   const int words_k = (scene.grid.size_k + 63) / 64;
-  for (int j = 0; j < scene.grid.size_j; ++j)
+  for (int tile_j = 0; tile_j < scene.grid.size_j; tile_j += VIEW_TILE)
     for (int w = 0; w < words_k; ++w)
-      for (int i = 0; i < scene.grid.size_i; ++i)
-        for (int k = 64 * w; k < std::min(64 * (w + 1), scene.grid.size_k); ++k)
-          if (candidates(i, j, k)) scene.voxels.emplace_back(i, j, k);
+      for (int tile_i = 0; tile_i < scene.grid.size_i; tile_i += VIEW_TILE)
+        for (int j = tile_j; j < std::min(tile_j + VIEW_TILE, scene.grid.size_j); ++j)
+          for (int i = tile_i; i < std::min(tile_i + VIEW_TILE, scene.grid.size_i); ++i)
+            for (int k = 64 * w; k < std::min(64 * (w + 1), scene.grid.size_k); ++k)
+              if (candidates(i, j, k)) scene.voxels.emplace_back(i, j, k);
   return scene;
 }
 

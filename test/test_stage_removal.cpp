@@ -75,7 +75,8 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   probe.stages().find_candidates();
   const Field<char> observed = random_field(probe.grid(), density, random);
   probe.set_observed(observed);
-  const Field<char> candidates = random_field(probe.grid(), 0.5, random);
+  Field<char> candidates = random_field(probe.grid(), 0.5, random);  // which are not observed
+  for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
   probe.set_candidates(candidates);
 
   probe.stages().select_in_view();

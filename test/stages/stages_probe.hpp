@@ -75,11 +75,16 @@ class StagesProbe {
   Bits observed() const { return read_bits(stages_.observed_); }
   Bits known() const { return read_bits(stages_.known_); }
   Bits filtered() const { return read_bits(stages_.filtered_); }
-  Bits candidates() const { return read_bits(stages_.candidates_); }
+  Bits candidates() const { return by_rows(stages_.candidates_.read(stages_.candidate_words())); }
   void set_observed(const Bits& bits) { stages_.observed_.write(reference::pack(bits)); }
   void set_known(const Bits& bits) { stages_.known_.write(reference::pack(bits)); }
   void set_filtered(const Bits& bits) { stages_.filtered_.write(reference::pack(bits)); }
-  void set_candidates(const Bits& bits) { stages_.candidates_.write(reference::pack(bits)); }
+  void set_candidates(const Bits& bits) {
+    const std::vector<std::uint64_t> rows = reference::pack(bits);
+    std::vector<std::uint64_t> words(stages_.candidate_words(), 0);
+    for_each_candidate_word([&](std::size_t word, std::size_t tile_word) { words[tile_word] = rows[word]; });
+    stages_.candidates_.write(words);
+  }
 
   /// @param family  0, 1, 2: paths along i, j, k; @param event  EVENT_ENTER_FORWARD and so on
   Bits event(int family, int event) const { return read_bits(stages_.events_, (family * EVENT_PLANES + event) * stages_.words()); }
@@ -185,6 +190,8 @@ class StagesProbe {
     stages_.removed_bits_.write(words);
     stages_.removed_ = 0;
     for (const std::uint64_t word : words) stages_.removed_ += __builtin_popcountll(word);
+    stages_.removed_ = 0;
+    for (const std::uint64_t word : words) stages_.removed_ += __builtin_popcountll(word);
   }
   std::uint64_t alive_word(std::uint32_t page) const { return peek<cl_ulong>(map_.alive(), page); }
 
@@ -247,9 +254,9 @@ class StagesProbe {
     return voxels;
   }
   Bits created() const {
-    std::vector<std::uint64_t> words(stages_.words(), 0);
+    std::vector<std::uint64_t> words(stages_.candidate_words(), 0);
     for (const std::uint32_t voxel : created_voxels()) words[voxel / 64] |= std::uint64_t{1} << voxel % 64;
-    return reference::unpack(words, grid().size_i, grid().size_j, grid().size_k);
+    return by_rows(words);
   }
 
   /// @return prefix sums, the total behind them
@@ -271,6 +278,31 @@ class StagesProbe {
  private:
   Bits read_bits(const DeviceArray<cl_ulong>& array, std::size_t offset = 0) const {
     return reference::unpack(array.read(stages_.words(), offset), grid().size_i, grid().size_j, grid().size_k);
+  }
+
+  /// Calls visit(number of a word in the order of the other bit fields, its number among the candidates', tile by tile).
+  template <typename Visit>
+  void for_each_candidate_word(Visit visit) const {
+    const int tiles_i = (grid().size_i + VIEW_TILE - 1) / VIEW_TILE;
+    std::size_t word = 0;
+    for (int j = 0; j < grid().size_j; ++j)
+      for (int w = 0; w < grid().words_k; ++w)
+        for (int i = 0; i < grid().size_i; ++i, ++word)
+          visit(word,
+                (((j / VIEW_TILE * grid().words_k + w) * tiles_i + i / VIEW_TILE) * VIEW_TILE + j % VIEW_TILE) * VIEW_TILE + i % VIEW_TILE);
+  }
+
+  /// Candidates; there are none beyond the grid.
+  Bits by_rows(const std::vector<std::uint64_t>& tile_words) const {
+    std::vector<std::uint64_t> words(stages_.words(), 0);
+    std::size_t bits = 0, bits_inside = 0;
+    for (const std::uint64_t word : tile_words) bits += __builtin_popcountll(word);
+    for_each_candidate_word([&](std::size_t word, std::size_t tile_word) {
+      words[word] = tile_words[tile_word];
+      bits_inside += __builtin_popcountll(words[word]);
+    });
+    EXPECT_EQ(bits_inside, bits) << "candidates beyond the grid";
+    return reference::unpack(words, grid().size_i, grid().size_j, grid().size_k);
   }
 
   static Bits unpack_face(const std::vector<std::uint64_t>& words, int rows, int columns, bool word_each) {
