@@ -37,6 +37,9 @@ __kernel void count_free(__global const uint* pages, const uint count, __global 
   if (n < count) free_slots[n] = PAGE_SLOTS - popcount(alive[pages[n]]);
 }
 
+// Pages that a block needs for new surfels in addition to its free slots.
+INLINE uint missing_pages(uint wanted, uint there) { return wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0; }
+
 // One work item a cell, and one more: where its new surfels begin when sorted, and pages that its block needs in addition.
 //   in  histogram: its prefix sum, the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
 //       free_before: prefix sum of count_free's, the total behind it
@@ -49,43 +52,58 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
   if (cell == cells) return;
   const uint wanted = histogram[SORT_CHUNKS * (cell + 1)] - histogram[SORT_CHUNKS * cell],
              there = free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]];
-  missing[cell] = wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0;
+  missing[cell] = missing_pages(wanted, there);
 }
 
-INLINE uint cell_of(const Window* window, int4 block) {
-  const int x = block.x - window->origin_x, y = block.y - window->origin_y, z = block.z - window->origin_z;
-  return (uint)((z * window->size_y + y) * window->size_x + x);
+// One work item: all of the above for few new surfels, where launches take longer than the work.
+__kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
+                       __global const ulong* alive, __global const uint* cell_pages, const uint cells, __global uint* free_before,
+                       __global uint* cell_begin, __global uint* missing, __global uint* order) {
+  if (get_global_id(0) > 0) return;
+  for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
+  for (uint n = 0; n < count; ++n) ++cell_begin[new_cells[n] + 1];
+  __global uint* next = missing;  // in each cell
+  for (uint cell = 0; cell < cells; ++cell) {
+    next[cell] = cell_begin[cell];
+    cell_begin[cell + 1] += cell_begin[cell];
+  }
+  for (uint n = 0; n < count; ++n) order[next[new_cells[n]]++] = n;
+  uint free_slots = 0;
+  for (uint n = 0; n < page_count; ++n) {
+    free_before[n] = free_slots;
+    free_slots += PAGE_SLOTS - (uint)popcount(alive[pages[n]]);
+  }
+  free_before[page_count] = free_slots;
+  for (uint cell = 0; cell < cells; ++cell)
+    missing[cell] =
+        missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
 }
 
-// One work item a page of the window, by cell: its free slots take their share of the cell's new surfels.
+// One work item a page of the window: its free slots take their share of the cell's new surfels.
+//   in  pages[count], page_cells[count]: first those that begin_cells knows, by cell, then those that have been added for what these do not
+//       take; new_ranks: of such, its number among those of its cell
 //   i/o the map
-__kernel void fill_pages(const Window window, __global const uint* pages, const uint count, __global const int4* page_block,
-                         __global const uint* cell_begin, __global const uint* cell_pages, __global const uint* free_before,
-                         __global const uint* order, __global const uint4* new_surfels, __global ulong* alive, __global ulong* changed,
+__kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
+                         __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
+                         __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
+                         __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
                          __global uint4* surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
-  const uint page = pages[n], cell = cell_of(&window, page_block[page]), end = cell_begin[cell + 1];
-  uint at = cell_begin[cell] + free_before[n] - free_before[cell_pages[cell]];
+  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1], known = count - new_count;
+  const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
+  uint at = cell_begin[cell] + before - free_before[cell_pages[cell]];
   ulong taken = 0;
   for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
     const uint bit = (uint)lowest_bit(left);
     surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
     taken |= 1ul << bit;
   }
+  if (taken == 0) return;
+  const int3 place = (int3)(cell % window.size_x, cell / window.size_x % window.size_y, cell / window.size_x / window.size_y);
+  page_block[page].xyz = (int3)(window.origin_x, window.origin_y, window.origin_z) + place;
   alive[page] |= taken;
   changed[page] |= taken;
-}
-
-// One work item a page that a block has just got.
-//   in  new_pages[count]: x, y, z of the block, w: the page
-__kernel void begin_new_pages(__global const int4* new_pages, const uint count, __global ulong* alive, __global ulong* changed,
-                              __global int4* page_block) {
-  const uint n = get_global_id(0);
-  if (n >= count) return;
-  const uint page = (uint)new_pages[n].w;
-  alive[page] = changed[page] = 0;
-  page_block[page] = (int4)(new_pages[n].xyz, 0);
 }
 
 // One work item a page of the window.

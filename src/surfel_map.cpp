@@ -11,11 +11,12 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kGathered = 1 << 14;  // pages brought to the host at a time
-constexpr float kFarthest = 1e6F;           // [m]; blocks are counted in 32 bits, and floats have 24
-constexpr std::size_t kSpare = 16;          // one page of so many is allocated ahead; on a CPU as many as there are, which cost
-                                            // nothing, or a page of the system, until they are touched
-constexpr double kLargestRadius = 4;        // [block]; the window, around all that surfels may reach, must not become large without end
+constexpr std::size_t kGathered = 1 << 14;   // pages brought to the host at a time
+constexpr float kFarthest = 1e6F;            // [m]; blocks are counted in 32 bits, and floats have 24
+constexpr std::size_t kSpare = 16;           // one page of so many is allocated ahead; on a CPU as many as there are, which cost
+                                             // nothing, or a page of the system, until they are touched
+constexpr std::size_t kFewToSort = 1 << 14;  // new surfels; on a CPU, where launches take longer
+constexpr double kLargestRadius = 4;         // [block]; the window, around all that surfels may reach, must not become large without end
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -43,13 +44,14 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       changed_(commands),
       page_block_(commands),
       pages_list_(commands),
+      page_cells_list_(commands),
       cell_pages_list_(commands),
+      new_ranks_list_(commands),
       histogram_(commands),
       cell_begin_(commands),
       free_before_(commands),
       missing_(commands),
       order_(commands),
-      new_pages_(commands),
       changes_(commands),
       empty_(commands),
       changed_slots_(commands),
@@ -58,12 +60,16 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
   grow(1024);
 }
 
+/// Pages without surfels have neither bits in `alive` nor in `changed`, those that are not in use either.
 void SurfelMap::grow(std::size_t pages) {
-  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
+  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare, before = alive_.size();
   surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
   alive_.grow(pages, kept, spare);
   changed_.grow(pages, kept, spare);
   page_block_.grow(pages, kept, spare);
+  if (alive_.size() == before) return;
+  alive_.fill("creation", 0, alive_.size() - kept, kept);
+  changed_.fill("creation", 0, changed_.size() - kept, kept);
 }
 
 /// How far from the grid a surfel may be that matters to it [m].
@@ -92,7 +98,7 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   list_window();
 }
 
-/// The window's pages by cell. Pages that insert() adds are at the end of their cell's, and listed wherever that is.
+/// The window's pages by cell.
 void SurfelMap::list_window() {
   std::vector<Page> pages;
   std::vector<cl_uint> page_cells;
@@ -107,15 +113,18 @@ void SurfelMap::list_window() {
   }
   close_window();  // nothing is listed if the list cannot be sent
   pages_list_.send(pages);
+  page_cells_list_.send(page_cells);
   cell_pages_list_.send(cell_pages_);
   window_pages_ = std::move(pages);
   page_cells_ = std::move(page_cells);
+  new_ranks_.clear();
 }
 
 /// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
 void SurfelMap::close_window() {
   window_pages_.clear();
   page_cells_.clear();
+  new_ranks_.clear();
 }
 
 std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
@@ -139,47 +148,60 @@ void SurfelMap::reserve(std::size_t additional) {
 
 void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
   if (count == 0) return;
-  const auto n = static_cast<cl_uint>(count), cell_count = static_cast<cl_uint>(window_.cells());
-  const std::size_t bins = SORT_CHUNKS * window_.cells();
-  histogram_.resize(bins + 1);
-  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), n, cell_count, histogram_());
-  lists_.prefix_sums(stage, histogram_, bins);
-  count_free(stage);
+  if (!new_ranks_.empty()) list_window();  // what was inserted before has added pages
+  const auto cell_count = static_cast<cl_uint>(window_.cells());
+  free_before_.resize(window_pages() + 1);
   cell_begin_.resize(cell_count + 1);
   missing_.resize(cell_count);
-  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
-                missing_());
   order_.resize(count);
-  commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), n, histogram_(), order_());
-  add_pages(stage, missing_.read(cell_count));
+  if (commands_.device().is_cpu && count <= kFewToSort)
+    commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
+                  alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
+  else
+    sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
+  add_pages(missing_.read(cell_count));
 
-  commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), static_cast<cl_uint>(window_pages()),
-                page_block_(), cell_begin_(), cell_pages_list_(), free_before_(), order_(), surfels(), alive_(), changed_(), surfels_());
+  commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), page_cells_list_(),
+                static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
+                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), surfels_());
   size_ += count;
 }
 
-void SurfelMap::count_free(const char* stage) {
-  free_before_.resize(window_pages() + 1);
-  if (window_pages() == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", window_pages(), kGroup, pages_list_(), static_cast<cl_uint>(window_pages()), alive_(), free_before_());
-  lists_.prefix_sums(stage, free_before_, window_pages());
+void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count) {
+  const auto pages = static_cast<cl_uint>(window_pages());
+  const std::size_t bins = SORT_CHUNKS * static_cast<std::size_t>(cell_count);
+  histogram_.resize(bins + 1);
+  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, cell_count, histogram_());
+  lists_.prefix_sums(stage, histogram_, bins);
+  if (pages == 0) free_before_.fill(stage, 0, 1);
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), free_before_());
+  lists_.prefix_sums(stage, free_before_, pages);
+  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
+                missing_());
+  commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), count, histogram_(), order_());
 }
 
-/// @param missing  pages that each cell's block needs
-void SurfelMap::add_pages(const char* stage, const std::vector<cl_uint>& missing) {
+/// Adds pages to the window, behind those that it has. @param missing  pages that each cell's block needs
+void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
-  std::vector<cl_int4> pages;
+  std::vector<Page> pages = window_pages_;
+  std::vector<cl_uint> page_cells = page_cells_, ranks;
   for (std::size_t cell = 0; cell < missing.size(); ++cell) {
-    const BlockKey block = window_.block(static_cast<int>(cell));
     if (missing[cell] > 0) listed_cells_[cell] = true;
-    for (cl_uint n = 0; n < missing[cell]; ++n) pages.push_back({{block.x, block.y, block.z, static_cast<cl_int>(index_.add_page(block))}});
+    for (cl_uint rank = 0; rank < missing[cell]; ++rank) {
+      pages.push_back(index_.add_page(window_.block(static_cast<int>(cell))));
+      page_cells.push_back(static_cast<cl_uint>(cell));
+      ranks.push_back(rank);
+    }
   }
-  if (pages.empty()) return;
-  const auto count = static_cast<cl_uint>(pages.size());
-  new_pages_.send(std::move(pages));
-  commands_.run(stage, "begin_new_pages", count, kGroup, new_pages_(), count, alive_(), changed_(), page_block_());
-  list_window();
-  count_free(stage);
+  new_ranks_list_.send(ranks);
+  if (ranks.empty()) return;
+  close_window();
+  pages_list_.send(pages);
+  page_cells_list_.send(page_cells);
+  window_pages_ = std::move(pages);
+  page_cells_ = std::move(page_cells);
+  new_ranks_ = std::move(ranks);
 }
 
 std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {

@@ -90,9 +90,9 @@ class SurfelMap {
   double window_margin(const Grid& grid) const;
   void list_window();
   void close_window();
-  void add_pages(const char* stage, const std::vector<cl_uint>& missing);
+  void add_pages(const std::vector<cl_uint>& missing);
   std::size_t allocated_bytes() const;
-  void count_free(const char* stage);
+  void sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
 
   Commands& commands_;
@@ -113,11 +113,11 @@ class SurfelMap {
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
   std::vector<bool> listed_cells_;                ///< whose blocks have pages, and meet the grid or have got some in this frame
-  SentArray<cl_uint> pages_list_, cell_pages_list_;
+  std::vector<cl_uint> new_ranks_;  ///< of pages that insert() has added behind the others: the how many-th of its cell's each is
+  SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_, new_ranks_list_;
 
   // Insertion
   DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
-  SentArray<cl_int4> new_pages_;
 
   // Changes
   DeviceArray<cl_ulong> changes_;

@@ -89,14 +89,17 @@ class Pages {
     check_window();
   }
 
-  /// The window has every page of each cell that may be in the grid, once, cell after cell.
+  /// The window has every page of each cell that may be in the grid, once, in whatever order.
   void check_window() const {
     std::vector<std::uint32_t> expected;
     for (const cl_uint cell : cells_) {
       const BlockIndex::Pages* pages = probe_.map().index().find(probe_.map().window().block(static_cast<int>(cell)));
       if (pages != nullptr) expected.insert(expected.end(), pages->begin(), pages->end());
     }
-    EXPECT_TRUE(probe_.window_pages() == expected);
+    std::vector<std::uint32_t> actual = probe_.window_pages();
+    std::sort(actual.begin(), actual.end());
+    std::sort(expected.begin(), expected.end());
+    EXPECT_TRUE(actual == expected);
     std::size_t in_window = 0;
     for (const auto& [page, block] : book_.pages) in_window += std::count(expected.begin(), expected.end(), page);
     EXPECT_EQ(in_window, expected.size()) << "pages that hold nothing";
@@ -203,7 +206,7 @@ class Pages {
 
 TEST(StageMapPages, InsertedSurfelsTakeFreeSlotsInOrder) {
   for (const int there : {0, 1, 3000})
-    for (const int count : {0, 1, 63, 64, 65, 5000}) {
+    for (const int count : {0, 1, 63, 64, 65, 5000, 20000}) {  // a CPU sorts few in one launch
       SCOPED_TRACE(std::to_string(there) + " surfels and " + std::to_string(count) + " more");
       Pages pages(static_cast<unsigned>(there + count));
       pages.fill(there);

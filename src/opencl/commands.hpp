@@ -115,13 +115,14 @@ class DeviceArray {
 
   T read_one(std::size_t index) const { return read(1, index).front(); }
 
-  void fill(const char* stage, T value, std::size_t size) {
+  void fill(const char* stage, T value, std::size_t size, std::size_t offset = 0) {
     cl::Event event;
-    commands_->queue().enqueueFillBuffer(buffer_, value, 0, size * sizeof(T), nullptr, &event);
+    commands_->queue().enqueueFillBuffer(buffer_, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
     commands_->note(stage, event);
   }
 
   const cl::Buffer& operator()() const { return buffer_; }
+  std::size_t size() const { return capacity_; }
   std::size_t bytes() const { return capacity_ * sizeof(T); }
 
  private:
