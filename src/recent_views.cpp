@@ -11,12 +11,16 @@ namespace {
 std::vector<float> find_block_depths(const WorkingImage& image) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
   const int columns = (width + VIEW_BLOCK - 1) / VIEW_BLOCK, rows = (height + VIEW_BLOCK - 1) / VIEW_BLOCK;
-  std::vector<float> blocks(static_cast<std::size_t>(columns) * rows, 0.0F);
-  for (int t = 0; t < height; ++t)
-    for (int s = 0; s < width; ++s) {
-      float& deepest = blocks[t / VIEW_BLOCK * columns + s / VIEW_BLOCK];
-      deepest = std::max(deepest, std::abs(image.depth[t * width + s]));
+  std::vector<float> blocks(static_cast<std::size_t>(columns) * rows, 0.0F), deepest(columns * VIEW_BLOCK);
+  for (int row = 0; row < rows; ++row) {
+    std::fill(deepest.begin(), deepest.end(), 0.0F);
+    for (int t = row * VIEW_BLOCK; t < std::min((row + 1) * VIEW_BLOCK, height); ++t) {
+      const float* depth = &image.depth[static_cast<std::size_t>(t) * width];
+      for (int s = 0; s < width; ++s) deepest[s] = std::max(deepest[s], std::abs(depth[s]));
     }
+    for (int column = 0; column < columns; ++column)
+      blocks[row * columns + column] = *std::max_element(&deepest[column * VIEW_BLOCK], &deepest[column * VIEW_BLOCK] + VIEW_BLOCK);
+  }
   return blocks;
 }
 
@@ -26,11 +30,14 @@ std::size_t squares(int pixels) { return (pixels + VIEW_SQUARE - 1) / VIEW_SQUAR
 std::vector<float> by_squares(const WorkingImage& image) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
   std::vector<float> depths(squares(width) * squares(height) * VIEW_SQUARE * VIEW_SQUARE, 0.0F);
-  for (int t = 0; t < height; ++t)
-    for (int s = 0; s < width; ++s) {
-      const std::size_t square = t / VIEW_SQUARE * squares(width) + s / VIEW_SQUARE;
-      depths[(square * VIEW_SQUARE + t % VIEW_SQUARE) * VIEW_SQUARE + s % VIEW_SQUARE] = std::abs(image.depth[t * width + s]);
-    }
+  for (int t = 0; t < height; ++t) {
+    const float* from = &image.depth[static_cast<std::size_t>(t) * width];
+    float* to = &depths[(t / VIEW_SQUARE * squares(width) * VIEW_SQUARE + t % VIEW_SQUARE) * VIEW_SQUARE];
+    int s = 0;
+    for (; s + VIEW_SQUARE <= width; s += VIEW_SQUARE, to += VIEW_SQUARE * VIEW_SQUARE)
+      for (int n = 0; n < VIEW_SQUARE; ++n) to[n] = std::abs(from[s + n]);
+    for (int n = 0; s + n < width; ++n) to[n] = std::abs(from[s + n]);
+  }
   return depths;
 }
 

@@ -56,19 +56,14 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have 3 or 4 bytes a pixel and rows no shorter than that.");
 }
 
-float read_depth(const DepthImage& image, int s, int t) {
-  const auto* row = static_cast<const std::uint8_t*>(image.data) + t * image.step;
-  if (image.encoding == DepthImage::Encoding::kMillimetresU16) {
-    std::uint16_t millimetres;
-    std::memcpy(&millimetres, row + 2 * s, 2);
-    if (image.swap_bytes) millimetres = __builtin_bswap16(millimetres);
-    return static_cast<float>(millimetres) / 1000.0F;
-  }
-  std::uint32_t bits;
-  std::memcpy(&bits, row + 4 * s, 4);
-  if (image.swap_bytes) bits = __builtin_bswap32(bits);
+float to_metres(std::uint16_t millimetres, bool swap_bytes) {
+  return static_cast<float>(swap_bytes ? __builtin_bswap16(millimetres) : millimetres) / 1000.0F;
+}
+
+float to_metres(std::uint32_t bits, bool swap_bytes) {
+  if (swap_bytes) bits = __builtin_bswap32(bits);
   float metres;
-  std::memcpy(&metres, &bits, 4);
+  std::memcpy(&metres, &bits, sizeof(metres));
   return metres;
 }
 
@@ -80,10 +75,31 @@ float interpret(float d, const Config& config) {
   return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
 }
 
-std::uint32_t read_color(const ColorImage& image, int s, int t) {
-  const std::uint8_t* pixel = image.data + t * image.step + static_cast<std::size_t>(s) * image.channels;
-  const bool rgb = image.order == ColorImage::Order::kRgb;
-  return pixel[rgb ? 0 : 2] | pixel[1] << 8 | pixel[rgb ? 2 : 0] << 16;
+/// Every step-th pixel of every step-th row. @tparam Pixel  as the image has them
+template <typename Pixel>
+std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
+  std::vector<float> depth;
+  depth.reserve(static_cast<std::size_t>(width) * height);
+  for (int t = 0; t < height; ++t) {
+    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * config.decimation * image.step;
+    for (int s = 0; s < width; ++s, row += config.decimation * sizeof(Pixel)) {
+      Pixel pixel;
+      std::memcpy(&pixel, row, sizeof(pixel));
+      depth.push_back(interpret(to_metres(pixel, image.swap_bytes), config));
+    }
+  }
+  return depth;
+}
+
+std::vector<std::uint32_t> read_color(const ColorImage& image, int width, int height, int step) {
+  const int red = image.order == ColorImage::Order::kRgb ? 0 : 2;
+  std::vector<std::uint32_t> color;
+  color.reserve(static_cast<std::size_t>(width) * height);
+  for (int t = 0; t < height; ++t) {
+    const std::uint8_t* pixel = image.data + t * step * image.step;
+    for (int s = 0; s < width; ++s, pixel += step * image.channels) color.push_back(pixel[red] | pixel[1] << 8 | pixel[2 - red] << 16);
+  }
+  return color;
 }
 
 }  // namespace
@@ -98,14 +114,10 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
   const Intrinsics& full = frame.intrinsics;
   WorkingImage image;
   image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
-  image.depth.resize(static_cast<std::size_t>(width) * height);
-  for (int t = 0; t < height; ++t)
-    for (int s = 0; s < width; ++s) image.depth[t * width + s] = interpret(read_depth(frame.depth, s * step, t * step), config);
-  if (frame.color) {
-    image.color.reserve(image.depth.size());
-    for (int t = 0; t < height; ++t)
-      for (int s = 0; s < width; ++s) image.color.push_back(read_color(*frame.color, s * step, t * step));
-  }
+  image.depth = frame.depth.encoding == DepthImage::Encoding::kMillimetresU16
+                    ? read_depth<std::uint16_t>(frame.depth, width, height, config)
+                    : read_depth<std::uint32_t>(frame.depth, width, height, config);
+  if (frame.color) image.color = read_color(*frame.color, width, height, step);
   return image;
 }
 
