@@ -30,8 +30,8 @@ INLINE float16 front_distances(const Grid* g, float16 z) { return 1.75f * 0.8660
 // Normals of new surfels: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
 // observed voxel nearest to it that does not, and the surfel is ragged.
 //   around: the voxels' observed_around
-Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
-                      Points center, Points mean, int16 around, int16 asked, int16* ragged) {
+INLINE Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
+                             Points center, Points mean, int16 around, int16 asked, int16* ragged) {
   const float16 reach = front_distances(g, center.z);
   *ragged = asked & ~own_view_knows(view, depths, add_scaled(center, reach, mean), asked);
   if (lane_bits(*ragged) == 0) return mean;
@@ -55,8 +55,8 @@ Points surfel_normals(const Grid* g, const View* view, __global const float* dep
 
 // Where in their voxels surfels stand: slid along their normals until they are near the boundary, in steps of a tenth of a voxel. A step
 // is left in hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
-Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* around, __global const float* depths, Voxels v, Points center,
-                         Points normal, int16 asked) {
+INLINE Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* around, __global const float* depths, Voxels v,
+                                Points center, Points normal, int16 asked) {
   const float16 step = 0.1f * voxel_sizes(g, center.z), front = front_distances(g, center.z);
   const Points forward = {step * normal.x, step * normal.y, step * normal.z};
   const Points ahead = {front * normal.x, front * normal.y, front * normal.z};
@@ -100,7 +100,8 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Window win
   Points p = center;
   Points normal = normalized((Points){gather(directions, at), gather(directions, at + LANES), gather(directions, at + 2 * LANES)});
   if (refine) {
-    const ViewsAround near = views_around(&g, views, tile_views, view_groups, v);
+    ViewsAround near;
+    find_views_around(&g, views, tile_views, view_groups, v, &near);
     normal = surfel_normals(&g, &view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist, &ragged);
     p = slide_to_boundary(&g, &view, &near, depths, v, center, normal, exist);
   }

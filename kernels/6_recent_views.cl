@@ -156,7 +156,8 @@ INLINE void keep_entries(__local Tile* own, int3 tile) {
 }
 
 // All points near the candidates of a tile.
-INLINE Box candidates_box(const Grid* g, __local const Tile* own, int3 tile, __global const float* layer_depth, float min_gap) {
+INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 tile, __global const float* layer_depth, float min_gap,
+                                Box* box) {
   const ulong mask = ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64);
   ulong8 of_columns = 0;
   uint rows = 0, columns = 0;
@@ -170,7 +171,7 @@ INLINE Box candidates_box(const Grid* g, __local const Tile* own, int3 tile, __g
   for (int column = 0; column < VIEW_TILE; ++column) columns |= (uint)(each[column] != 0) << column;
   const uint layers = tile_layers(all_bits(of_columns), tile);
   const int3 corner = tile * (int3)(VIEW_TILE, VIEW_TILE, VIEW_TILE_K);
-  return tile_box(g, layer_depth, corner + (int3)(lowest_lane(columns), lowest_lane(rows), lowest_lane(layers)),
+  *box = tile_box(g, layer_depth, corner + (int3)(lowest_lane(columns), lowest_lane(rows), lowest_lane(layers)),
                   corner + 31 - (int3)((int)clz(columns), (int)clz(rows), (int)clz(layers)), min_gap);
 }
 
@@ -303,7 +304,8 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
     if (own.entry_count != 0) {
       if (lane == 0) keep_entries(&own, tile);
       barrier(CLK_LOCAL_MEM_FENCE);
-      const Box box = candidates_box(&g, &own, tile, layer_depth, min_gap);
+      Box box;
+      find_candidates_box(&g, &own, tile, layer_depth, min_gap, &box);
       __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
       for (int n = lane; n < view_groups; n += lanes)
         own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, depths, &box);
@@ -327,17 +329,20 @@ typedef struct {
   int tiles[LANES], tile_count;
 } ViewsAround;
 
-INLINE ViewsAround views_around(const Grid* g, __global const View* views, __global const ushort* tile_views, int view_groups, Voxels v) {
-  ViewsAround around = {views, tile_views, view_groups, {0}, 0};
+INLINE void find_views_around(const Grid* g, __global const View* views, __global const ushort* tile_views, int view_groups, Voxels v,
+                              ViewsAround* around) {
+  around->views = views;
+  around->tile_views = tile_views;
+  around->view_groups = view_groups;
+  around->tile_count = 0;
   const int tiles_i = grid_tiles(g->size_i), tiles_k = 64 / VIEW_TILE_K * g->words_k;
   int tiles[LANES];
   vstore16((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
   for (int n = 0; n < LANES; ++n) {
     bool is_new = true;
-    for (int m = 0; m < around.tile_count; ++m) is_new = is_new && around.tiles[m] != tiles[n];
-    if (is_new) around.tiles[around.tile_count++] = tiles[n];
+    for (int m = 0; m < around->tile_count; ++m) is_new = is_new && around->tiles[m] != tiles[n];
+    if (is_new) around->tiles[around->tile_count++] = tiles[n];
   }
-  return around;
 }
 
 // Which of LANES points of this frame's camera, near candidates, does a kept view know?
@@ -377,7 +382,8 @@ __kernel void close_gaps(const Grid g, const Limits limits, const View view, __g
   if (lane_bits(open) == 0) return;
   const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
   open &= ~own_view_knows(&view, depths, behind, open);
-  const ViewsAround around = views_around(&g, views, tile_views, view_groups, v);
+  ViewsAround around;
+  find_views_around(&g, views, tile_views, view_groups, v, &around);
   open &= ~any_view_knows(&around, depths, behind, open);
   int closed[LANES];
   vstore16(numbers, 0, closed);
