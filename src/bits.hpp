@@ -1,0 +1,14 @@
+/// Bits of words.
+#pragma once
+
+#include <cstdint>
+
+namespace frontier_surfels {
+
+/// Calls visitor(number) for each set bit, ascending.
+template <typename Visitor>
+void for_each_bit(std::uint64_t bits, Visitor visitor) {
+  for (; bits != 0; bits &= bits - 1) visitor(static_cast<std::uint32_t>(__builtin_ctzll(bits)));
+}
+
+}  // namespace frontier_surfels
