@@ -15,11 +15,8 @@ __kernel void list_few_bits(__global const ulong* words, const uint count, __glo
   if (get_global_id(0) > 0) return;
   uint at = 0;
   for (uint n = 0; n < count; ++n) {
-    const uint bits = (uint)popcount(words[n]);
-    if (at + bits <= room)
-      for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
-    else
-      at += bits;
+    for (ulong left = words[n]; left != 0; left &= left - 1, ++at)
+      if (at < room) list[at] = 64 * n + lowest_bit(left);
   }
   *total = at;
 }
