@@ -148,7 +148,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   cell_begin_.resize(cell_count + 1);
   missing_.resize(cell_count);
   order_.resize(count);
-  if (commands_.device().is_cpu && count <= kFewToSort)
+  if (commands_.device().long_loops && count <= kFewToSort)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
                   alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else

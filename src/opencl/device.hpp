@@ -10,6 +10,7 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
+  bool long_loops = false;     ///< one work item may do all of a small piece of work: llvmpipe ends loops after 65535 turns
   bool shares_memory = false;  ///< with the host
   std::string description;     ///< platform, name and compute units
 };
