@@ -16,11 +16,7 @@ __kernel void filter_candidates(const Grid g, const Limits limits, __global cons
   const int16 numbers = load_chunk(voxels, count, chunk, &exist), at = numbers / 32, bit = (int16)(1) << numbers % 32;
   const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
   int16 open = exist & ((gather_int(candidates, at) & bit) != 0) & (lengths(direction) >= limits.normal_min);
-  if (has_known) {
-    const Voxels v = voxels_of(&g, numbers);
-    const int16 word = (v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i;
-    open &= (gather_int(known, 2 * word + ((v.k >> 5) & 1)) & bit) == 0;
-  }
+  if (has_known) open &= (gather_int(known, voxel_halves(&g, voxels_of(&g, numbers))) & bit) == 0;
   kept[chunk] = (ushort)lane_bits(open);
 }
 

@@ -77,6 +77,14 @@ INLINE int16 inside_grid16(const Grid* g, Voxels v) {
   return (v.i >= 0) & (v.j >= 0) & (v.k >= 0) & (v.i < g->size_i) & (v.j < g->size_j) & (v.k < g->size_k);
 }
 
+// Where voxels are in bit fields, as numbers of 32-bit halves: in word_index's order, and in tile_word_index's; and their bits there.
+INLINE int16 voxel_halves(const Grid* g, Voxels v) { return 2 * ((v.j * g->words_k + (v.k >> 6)) * g->size_i + v.i) + ((v.k >> 5) & 1); }
+INLINE int16 candidate_halves(const Grid* g, Voxels v) {
+  const int16 tile = (v.j / VIEW_TILE * g->words_k + (v.k >> 6)) * grid_tiles(g->size_i) + v.i / VIEW_TILE;
+  return 2 * (tile * TILE_COLUMNS + v.j % VIEW_TILE * VIEW_TILE + v.i % VIEW_TILE) + ((v.k >> 5) & 1);
+}
+INLINE int16 half_bits(int16 k) { return (int16)(1) << (k & 31); }
+
 INLINE int16 same_voxels(Voxels a, Voxels b) { return (a.i == b.i) & (a.j == b.j) & (a.k == b.k); }
 
 // A row of the grid's voxels, and of the working image's pixels, has so many chunks of LANES, and words of 32.

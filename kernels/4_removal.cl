@@ -59,12 +59,10 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
     const int16 inside = inside_grid16(&g, v) & seen;
     if (lane_bits(inside) != 0) {
       found->large[item] = (ushort)lane_bits(inside & (s.radius / voxel >= limits.split_radius));
-      const int16 bit = (int16)(1) << (v.k & 31), upper = (v.k >> 5) & 1, word = v.j / VIEW_TILE * g.words_k + (v.k >> 6);
-      const int16 column = v.j % VIEW_TILE * VIEW_TILE + v.i % VIEW_TILE;
-      const int16 candidate = inside ? 2 * ((word * grid_tiles(g.size_i) + v.i / VIEW_TILE) * TILE_COLUMNS + column) + upper : 0;
+      const int16 bit = half_bits(v.k), candidate = inside ? candidate_halves(&g, v) : 0;
       const int16 is_candidate = inside & ((gather_int(candidates, candidate) & bit) != 0);
       // Candidates are not observed: that is asked of the others alone.
-      const int16 rest = inside & ~is_candidate, at = rest ? 2 * ((v.j * g.words_k + (v.k >> 6)) * g.size_i + v.i) + upper : 0;
+      const int16 rest = inside & ~is_candidate, at = rest ? voxel_halves(&g, v) : 0;
       int16 stay = is_candidate | (rest & ((gather_int(observed, at) & bit) == 0));
       stay &= ~leaves(&limits, &view, remove_buried, depths, &s, stored_normals(&s, &T_camera_local), stay);
       found->removed[item] = (ushort)lane_bits(inside & ~stay);

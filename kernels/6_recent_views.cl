@@ -204,8 +204,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
 
   int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
   for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
-    const uint layers = tile_layers(own.layers, tile);
-    if (layers == 0) continue;
+    if (tile_layers(own.layers, tile) == 0) continue;
     if (lane == 0) {
       list_entries(&own, tile);
       list_likely_views(&g, tile, layer_depth, view_lanes, depths, &own);

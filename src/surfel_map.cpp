@@ -56,14 +56,16 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
 
 /// Pages without surfels have neither bits in `alive` nor in `changed`, those that are not in use either.
 void SurfelMap::grow(std::size_t pages) {
-  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare, before = alive_.size();
+  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
+  const auto grow_marks = [&](DeviceArray<cl_ulong>& marks) {
+    const std::size_t before = marks.size();
+    marks.grow(pages, kept, spare);
+    if (marks.size() > before) marks.fill("creation", 0, marks.size() - kept, kept);
+  };
   surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
-  alive_.grow(pages, kept, spare);
-  changed_.grow(pages, kept, spare);
+  grow_marks(alive_);
+  grow_marks(changed_);
   page_block_.grow(pages, kept, spare);
-  if (alive_.size() == before) return;
-  alive_.fill("creation", 0, alive_.size() - kept, kept);
-  changed_.fill("creation", 0, changed_.size() - kept, kept);
 }
 
 /// How far from the grid a surfel may be that matters to it [m].
@@ -95,23 +97,27 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
 /// The window's pages by cell.
 void SurfelMap::list_window() {
   std::vector<Page> pages;
-  std::vector<cl_uint> page_cells;
-  cell_pages_.assign(1, 0);
+  std::vector<cl_uint> page_cells, cell_pages = {0};
   for (int cell = 0; cell < window_.cells(); ++cell) {
     if (listed_cells_[cell]) {
       const BlockIndex::Pages& own = *index_.find(window_.block(cell));
       pages.insert(pages.end(), own.begin(), own.end());
       page_cells.resize(pages.size(), static_cast<cl_uint>(cell));
     }
-    cell_pages_.push_back(static_cast<cl_uint>(pages.size()));
+    cell_pages.push_back(static_cast<cl_uint>(pages.size()));
   }
+  set_window(std::move(pages), std::move(page_cells), {});
+  cell_pages_list_.send(std::move(cell_pages));
+}
+
+void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks) {
   close_window();  // nothing is listed if the list cannot be sent
   pages_list_.send(pages);
   page_cells_list_.send(page_cells);
-  cell_pages_list_.send(cell_pages_);
+  new_ranks_list_.send(new_ranks);
   window_pages_ = std::move(pages);
   page_cells_ = std::move(page_cells);
-  new_ranks_.clear();
+  new_ranks_ = std::move(new_ranks);
 }
 
 /// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
@@ -188,14 +194,7 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
       ranks.push_back(rank);
     }
   }
-  new_ranks_list_.send(ranks);
-  if (ranks.empty()) return;
-  close_window();
-  pages_list_.send(pages);
-  page_cells_list_.send(page_cells);
-  window_pages_ = std::move(pages);
-  page_cells_ = std::move(page_cells);
-  new_ranks_ = std::move(ranks);
+  if (!ranks.empty()) set_window(std::move(pages), std::move(page_cells), std::move(ranks));
 }
 
 std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
@@ -291,8 +290,8 @@ std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_byte
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;
-  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + 2 * sizeof(cl_ulong) + sizeof(cl_int4);
-  return allocated_bytes() - kPage * index_.end();
+  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);  // `alive` and `changed` are cleared as a whole
+  return surfels_.bytes() + page_block_.bytes() - kPage * index_.end();
 }
 
 }  // namespace frontier_surfels

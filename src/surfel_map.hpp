@@ -89,6 +89,7 @@ class SurfelMap {
   void grow(std::size_t pages);
   double window_margin(const Grid& grid) const;
   void list_window();
+  void set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks);
   void close_window();
   void add_pages(const std::vector<cl_uint>& missing);
   std::size_t allocated_bytes() const;
@@ -111,9 +112,10 @@ class SurfelMap {
   // This frame's window: pages by cell
   MapWindow window_;
   std::vector<Page> window_pages_;
-  std::vector<cl_uint> page_cells_, cell_pages_;  ///< cell of each page; where each cell's pages begin, and where the last ends
-  std::vector<bool> listed_cells_;                ///< whose blocks have pages, and meet the grid or have got some in this frame
-  std::vector<cl_uint> new_ranks_;  ///< of pages that insert() has added behind the others: the how many-th of its cell's each is
+  std::vector<cl_uint> page_cells_;  ///< cell of each page
+  std::vector<bool> listed_cells_;   ///< whose blocks have pages, and meet the grid or have got some in this frame
+  std::vector<cl_uint> new_ranks_;   ///< of pages that insert() has added behind the others: the how many-th of its cell's each is
+  /// The same for the kernels, and where each cell's pages begin, and where the last ends.
   SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_, new_ranks_list_;
 
   // Insertion
