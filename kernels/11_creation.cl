@@ -33,18 +33,21 @@ INLINE Points surfel_normals(const Grid* g, const View* view, __global const flo
   if (lane_bits(*ragged) == 0) return mean;
   Points best = mean;
   float16 best_cosine = -1.0f;
-  for (int n = 0; n < 27; ++n) {
-    int16 better = *ragged & ((around & 1 << n) != 0);
-    if (lane_bits(better) == 0) continue;
-    const Points u = voxel_centers(g, layer_depth, (Voxels){v.i + n % 3 - 1, v.j + n / 3 % 3 - 1, v.k + n / 9 - 1});
-    const Points direction = normalized((Points){u.x - center.x, u.y - center.y, u.z - center.z});
-    const float16 cosine = direction.x * mean.x + direction.y * mean.y + direction.z * mean.z;
-    better &= cosine > best_cosine;
-    better = own_view_knows(view, depths, add_scaled(center, reach, direction), better);
-    best.x = better ? direction.x : best.x;
-    best.y = better ? direction.y : best.y;
-    best.z = better ? direction.z : best.z;
-    best_cosine = better ? cosine : best_cosine;
+  for (int dk = -1; dk <= 1; ++dk) {
+    Layer layer;
+    layer_around(g, layer_depth, v, center, dk, &layer);
+    for (int n = 0; n < 9; ++n) {
+      int16 better = *ragged & ((around & 1 << AROUND(n % 3 - 1, n / 3 - 1, dk)) != 0);
+      if (lane_bits(better) == 0) continue;
+      const Points direction = normalized((Points){layer.x[n % 3], layer.y[n / 3], layer.z});
+      const float16 cosine = direction.x * mean.x + direction.y * mean.y + direction.z * mean.z;
+      better &= cosine > best_cosine;
+      better = own_view_knows(view, depths, add_scaled(center, reach, direction), better);
+      best.x = better ? direction.x : best.x;
+      best.y = better ? direction.y : best.y;
+      best.z = better ? direction.z : best.z;
+      best_cosine = better ? cosine : best_cosine;
+    }
   }
   return best;
 }

@@ -55,9 +55,9 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
     const float16 voxel = voxel_sizes(&g, s.position.z);
     const int16 seen = reach_grid(&g, &limits, &s, voxel) & lane_marks(lanes);
     found->in_view[item] = (ushort)lane_bits(seen);
-    const Voxels v = voxels_at(&g, s.position);
-    const int16 inside = inside_grid16(&g, v) & seen;
-    if (lane_bits(inside) != 0) {
+    if (lane_bits(seen) != 0) {
+      const Voxels v = voxels_at(&g, s.position);
+      const int16 inside = inside_grid16(&g, v) & seen;
       found->large[item] = (ushort)lane_bits(inside & (s.radius / voxel >= limits.split_radius));
       const int16 bit = half_bits(v.k), candidate = inside ? candidate_halves(&g, v) : 0;
       const int16 is_candidate = inside & ((gather_int(candidates, candidate) & bit) != 0);

@@ -22,19 +22,38 @@ INLINE Points voxel_centers(const Grid* g, __global const float* layer_depth, Vo
   return p;
 }
 
-// The observed ones of the 27 voxels around v: bit 9 (dk + 1) + 3 (dj + 1) + di + 1.
+// The 27 voxels around a voxel in one number: a bit AROUND(di, dj, dk) for each.
+#define AROUND(di, dj, dk) (3 * (3 * ((dj) + 1) + (di) + 1) + (dk) + 1)
+
+// From the centre of a voxel to those of the voxels around it in layer dk: x[di + 1], y[dj + 1], z.
+typedef struct {
+  float16 x[3], y[3], z;
+} Layer;
+
+INLINE void layer_around(const Grid* g, __global const float* layer_depth, Voxels v, Points center, int dk, Layer* layer) {
+  for (int n = 0; n < 3; ++n) {
+    const Points u = voxel_centers(g, layer_depth, (Voxels){v.i + n - 1, v.j + n - 1, v.k + dk});
+    layer->x[n] = u.x - center.x;
+    layer->y[n] = u.y - center.y;
+    layer->z = u.z - center.z;
+  }
+}
+
+// The observed ones of the layers bit - 1, bit and bit + 1 of a column, whose word is `at`; the next word may have the first or the last.
+INLINE int observed_layers(const Grid* g, __global const ulong* observed, int at, int w, int bit) {
+  if (bit > 0 && bit < 63) return (int)(observed[at] >> (bit - 1)) & 7;
+  if (bit == 0) return (int)(observed[at] << 1) & 6 | (w > 0 ? (int)(observed[at - g->size_i] >> 63) : 0);
+  return (int)(observed[at] >> 62) | (w + 1 < g->words_k ? (int)(observed[at + g->size_i] & 1) << 2 : 0);
+}
+
+// The observed ones of the 27 voxels around one.
 INLINE int observed_around(const Grid* g, __global const ulong* observed, int i, int j, int k) {
   const int w = k >> 6, bit = k & 63;
   int around = 0;
-  for (int n = 0; n < 9; ++n) {
-    const int u = i + n % 3 - 1, v = j + n / 3 - 1;
-    if (u < 0 || v < 0 || u >= g->size_i || v >= g->size_j) continue;
-    const int at = word_index(g, u, v, w);
-    ulong three = bit == 0 ? observed[at] << 1 : observed[at] >> (bit - 1);
-    if (bit == 0 && w > 0) three |= observed[at - g->size_i] >> 63;
-    if (bit == 63 && w + 1 < g->words_k) three |= observed[at + g->size_i] << 2;
-    around |= ((int)(three & 1) | (int)(three & 2) << 8 | (int)(three & 4) << 16) << n;
-  }
+  for (int dj = -1; dj <= 1; ++dj)
+    for (int di = -1; di <= 1; ++di)
+      if (i + di >= 0 && j + dj >= 0 && i + di < g->size_i && j + dj < g->size_j)
+        around |= observed_layers(g, observed, word_index(g, i + di, j + dj, w), w, bit) << AROUND(di, dj, -1);
   return around;
 }
 
@@ -65,15 +84,18 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
 
   const Points center = voxel_centers(&g, layer_depth, v);
   Points sum = {0.0f, 0.0f, 0.0f};
-  for (int n = 0; n < 27; ++n) {
-    const int16 is_set = (bits & 1 << n) != 0;
-    if (lane_bits(is_set) == 0) continue;
-    const Points u = voxel_centers(&g, layer_depth, (Voxels){v.i + n % 3 - 1, v.j + n / 3 % 3 - 1, v.k + n / 9 - 1});
-    const Points direction = {u.x - center.x, u.y - center.y, u.z - center.z};
-    const float16 distance = lengths(direction);
-    sum.x += is_set ? direction.x / distance : 0.0f;
-    sum.y += is_set ? direction.y / distance : 0.0f;
-    sum.z += is_set ? direction.z / distance : 0.0f;
+  for (int dk = -1; dk <= 1; ++dk) {
+    Layer layer;
+    layer_around(&g, layer_depth, v, center, dk, &layer);
+    for (int n = 0; n < 9; ++n) {
+      const int16 is_set = (bits & 1 << AROUND(n % 3 - 1, n / 3 - 1, dk)) != 0;
+      if (lane_bits(is_set) == 0) continue;
+      const Points direction = {layer.x[n % 3], layer.y[n / 3], layer.z};
+      const float16 distance = lengths(direction);
+      sum.x += is_set ? direction.x / distance : 0.0f;
+      sum.y += is_set ? direction.y / distance : 0.0f;
+      sum.z += is_set ? direction.z / distance : 0.0f;
+    }
   }
   vstore16(sum.x, 3 * chunk, directions);
   vstore16(sum.y, 3 * chunk + 1, directions);
