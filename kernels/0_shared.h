@@ -30,9 +30,10 @@ namespace frontier_surfels {
 // So many rows of the grid one work item observes.
 #define SPACE_ROWS 8
 
-// Images of views are kept in squares of VIEW_SQUARE x VIEW_SQUARE pixels, row by row, and so are the pixels of a square: one is 64 bytes.
+// Images of views are kept in patches of PATCH_COLUMNS x PATCH_ROWS pixels, row by row, and so are the pixels of a patch: one is 64 bytes.
 // Points near each other are asked for together, and a row of pixels would be of use for one of them.
-#define VIEW_SQUARE 4
+#define PATCH_COLUMNS 8
+#define PATCH_ROWS 4
 
 // So many candidates, or views, one work item handles at once, as vectors of 16; and the numbers that a view then has.
 #define LANES 16
@@ -111,12 +112,13 @@ typedef struct {
   float block_size;                         // edge of a block, a power of two [m]
 } Window;
 
-// A kept view: what its camera sees of this frame's, and where its depths, and the largest depths of its blocks, start in the pool.
+// A kept view: what its camera sees of this frame's, and where its depths start in the pool; behind them the largest depths of its blocks.
+// Depths are whole numbers of steps, 16 bits each.
 typedef struct {
   Transform to_image;  // this frame's camera -> (x, y, z): in the view's camera at depth z, in column x / z and row y / z, rounded down
   SHARED_INT width, height;
   SHARED_UINT first_pixel;
-  SHARED_UINT first_block;
+  float depth_step;  // [m]
 } View;
 
 // A surfel as the view's grid sees it.

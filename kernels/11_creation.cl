@@ -26,7 +26,7 @@ INLINE float16 front_distances(const Grid* g, float16 z) { return 1.75f * 0.8660
 // Normals of new surfels: the mean direction; if that leaves known space again at 7/4 r (thin or ragged space), the direction to a single
 // observed voxel nearest to it that does not, and the surfel is ragged.
 //   around: the voxels' observed_around
-INLINE Points surfel_normals(const Grid* g, const View* view, __global const float* depths, __global const float* layer_depth, Voxels v,
+INLINE Points surfel_normals(const Grid* g, const View* view, __global const ushort* depths, __global const float* layer_depth, Voxels v,
                              Points center, Points mean, int16 around, int16 asked, int16* ragged) {
   const float16 reach = front_distances(g, center.z);
   *ragged = asked & ~own_view_knows(view, depths, add_scaled(center, reach, mean), asked);
@@ -54,7 +54,7 @@ INLINE Points surfel_normals(const Grid* g, const View* view, __global const flo
 
 // Where in their voxels surfels stand: slid along their normals until they are near the boundary, in steps of a tenth of a voxel. A step
 // is left in hand before what this view or a kept one knows, and a surfel that has known space before it (at 7/4 r) does not lose it.
-INLINE Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* around, __global const float* depths, Voxels v,
+INLINE Points slide_to_boundary(const Grid* g, const View* view, const ViewsAround* around, __global const ushort* depths, Voxels v,
                                 Points center, Points normal, int16 asked) {
   const float16 step = 0.1f * voxel_sizes(g, center.z), front = front_distances(g, center.z);
   const Points forward = {step * normal.x, step * normal.y, step * normal.z};
@@ -86,7 +86,7 @@ INLINE Points slide_to_boundary(const Grid* g, const View* view, const ViewsArou
 //   out new_surfels[count], new_cells[count]: for the map
 __kernel void create_surfels(const Grid g, const Limits limits, const Window window, const Transform T_local_camera, const int refine,
                              const View view, __global const View* views, __global const ushort* tile_views, const int view_groups,
-                             __global const float* depths, __global const float* layer_depth, __global const int* created, const int count,
+                             __global const ushort* depths, __global const float* layer_depth, __global const int* created, const int count,
                              __global const int* voxels, __global const int* around, __global const float* directions,
                              __global uint4* new_surfels, __global uint* new_cells) {
   const int chunk = get_global_id(0);

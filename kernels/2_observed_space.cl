@@ -99,29 +99,35 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
 
 // Where pixels of a view's image are (0_shared.h).
 INLINE uint16 view_pixels(uint16 width, uint16 column, uint16 row) {
-  const uint16 columns = (width + VIEW_SQUARE - 1) / VIEW_SQUARE;
-  const uint16 square = row / VIEW_SQUARE * columns + column / VIEW_SQUARE;
-  return (square * VIEW_SQUARE + row % VIEW_SQUARE) * VIEW_SQUARE + column % VIEW_SQUARE;
+  const uint16 columns = (width + PATCH_COLUMNS - 1) / PATCH_COLUMNS;
+  const uint16 patch = row / PATCH_ROWS * columns + column / PATCH_COLUMNS;
+  return (patch * PATCH_ROWS + row % PATCH_ROWS) * PATCH_COLUMNS + column % PATCH_COLUMNS;
+}
+
+// Depths of pixels [m]. Two of them are read at a time: there is an instruction for it.
+INLINE float16 view_depths(__global const ushort* depths, int16 pixel, float step) {
+  const int16 two = gather_int((__global const int*)depths, pixel >> 1);
+  return convert_float16(two >> ((pixel & 1) << 4) & 0xffff) * step;
 }
 
 // Which of LANES points does a view see: its pixel there is valid and lies deeper?
 //   q: column and row times depth, and depth (View)
-INLINE int16 sees(const View* view, __global const float* depths, Points q, int16 asked) {
+INLINE int16 sees(const View* view, __global const ushort* depths, Points q, int16 asked) {
   const float16 scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
   const int16 seen = asked & (q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height);
   if (lane_bits(seen) == 0) return 0;
   const uint16 pixel = view_pixels((uint)view->width, convert_uint16(s), convert_uint16(t));
-  return seen & (q.z < gather(depths + view->first_pixel, seen ? as_int16(pixel) : 0));
+  return seen & (q.z < view_depths(depths + view->first_pixel, seen ? as_int16(pixel) : 0, view->depth_step));
 }
 
 // Exact membership of points in the space that one view has seen, of those that are asked.
-//   depths: all views' images, without signs;  p: in this frame's camera [m]
-INLINE int16 knows(const View* view, __global const float* depths, Points p, int16 asked) {
+//   depths: all views' images, without signs, rounded down;  p: in this frame's camera [m]
+INLINE int16 knows(const View* view, __global const ushort* depths, Points p, int16 asked) {
   return sees(view, depths, transform_points(&view->to_image, p), asked);
 }
 
 // The same of this frame's own view, whose camera has no other orientation.
-INLINE int16 own_view_knows(const View* view, __global const float* depths, Points p, int16 asked) {
+INLINE int16 own_view_knows(const View* view, __global const ushort* depths, Points p, int16 asked) {
   const Transform* K = &view->to_image;
   return sees(view, depths, (Points){fma(p.x, K->r00, p.z * K->r02), fma(p.y, K->r11, p.z * K->r12), p.z}, asked);
 }

@@ -3,7 +3,7 @@
 // (12_labels). Ours: surfels go also where this frame has seen their back, and frontier on a sheet of unknown thinner than min_gap.
 
 // Which surfels go, of those inside the grid.
-INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, __global const float* depths, const Surfels* s,
+INLINE int16 leaves(const Limits* limits, const View* view, int remove_buried, __global const ushort* depths, const Surfels* s,
                     Points normal, int16 inside) {
   int16 gone = 0;
   if (remove_buried) gone |= own_view_knows(view, depths, add_scaled(s->position, -0.25f * s->radius, normal), inside);
@@ -38,7 +38,7 @@ typedef struct {
 //   out in_view[count], large[count], removed[count]
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
     const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
-    const int has_color, __global const float* depths, __global const float* depth, __global const int* column_end,
+    const int has_color, __global const ushort* depths, __global const float* depth, __global const int* column_end,
     __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
     __global const uint4* surfels, __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view,
     __global ulong* large, __global ulong* removed, __global uint* counts) {

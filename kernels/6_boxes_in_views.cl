@@ -47,18 +47,20 @@ INLINE int16 reaches_side(float16 x, float16 half_x, float16 z, float16 half_z, 
 }
 
 // Does a view know nothing in a rectangle of its image at the depth `near` or beyond?
-INLINE bool is_hidden(const View* view, __global const float* depths, int4 pixels, float near) {
+INLINE bool is_hidden(const View* view, __global const ushort* depths, int4 pixels, float near) {
   const int columns = (view->width + VIEW_BLOCK - 1) / VIEW_BLOCK;
   const int4 blocks = pixels / VIEW_BLOCK;
+  const int patches = (view->width + PATCH_COLUMNS - 1) / PATCH_COLUMNS * ((view->height + PATCH_ROWS - 1) / PATCH_ROWS);
+  __global const ushort* largest = depths + view->first_pixel + patches * PATCH_COLUMNS * PATCH_ROWS;
   for (int t = blocks.y; t <= blocks.w; ++t)
     for (int s = blocks.x; s <= blocks.z; ++s)
-      if (depths[view->first_block + t * columns + s] > near) return false;
+      if ((float)largest[t * columns + s] * view->depth_step > near) return false;
   return true;
 }
 
 // Which of a group of LANES views may know a point of a box, a bit each. The others certainly know none: the box is outside of their
 // image, or behind all that they have seen there.
-uint views_of_box(__global const float* lanes, __global const View* views, __global const float* depths, const Box* box) {
+uint views_of_box(__global const float* lanes, __global const View* views, __global const ushort* depths, const Box* box) {
   const BoxInViews b = box_in_views(lanes, box);
   const float16 fx = vload16(12, lanes), fy = vload16(13, lanes), cx = vload16(14, lanes) + 0.5f, cy = vload16(15, lanes) + 0.5f;
   const float16 width = vload16(16, lanes), height = vload16(17, lanes);

@@ -88,7 +88,7 @@ INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 til
 
 // How many of PROBES candidates of a tile each of LANES views knows, but for rounding: it decides who is asked first, no more.
 INLINE int16 count_known(const Grid* g, int3 tile, __global const float* layer_depth, __global const float* lanes,
-                         __global const float* depths, __local const Tile* own) {
+                         __global const ushort* depths, float depth_step, __local const Tile* own) {
   const float16 r00 = vload16(0, lanes), r01 = vload16(1, lanes), r02 = vload16(2, lanes);
   const float16 r10 = vload16(3, lanes), r11 = vload16(4, lanes), r12 = vload16(5, lanes);
   const float16 r20 = vload16(6, lanes), r21 = vload16(7, lanes), r22 = vload16(8, lanes);
@@ -106,15 +106,15 @@ INLINE int16 count_known(const Grid* g, int3 tile, __global const float* layer_d
     const float16 s = (r00 * x + r01 * y + r02 * z + t0) * fx * scale + cx, t = (r10 * x + r11 * y + r12 * z + t1) * fy * scale + cy;
     const int16 seen = (depth > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < width) & (t < height);
     const uint16 pixel = first_pixel + view_pixels(convert_uint16(width), convert_uint16(s), convert_uint16(t));
-    counts -= seen & (depth < gather(depths, seen ? as_int16(pixel) : 0));
+    counts -= seen & (depth < view_depths(depths, seen ? as_int16(pixel) : 0, depth_step));
   }
   return counts;
 }
 
 // Lists those of the first LANES views that know some of the probes, those that know most first.
-INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const float* lanes,
-                              __global const float* depths, __local Tile* own) {
-  const int16 counts = count_known(g, tile, layer_depth, lanes, depths, own);
+INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views,
+                              __global const float* lanes, __global const ushort* depths, __local Tile* own) {
+  const int16 counts = count_known(g, tile, layer_depth, lanes, depths, views->depth_step, own);
   uint count = 0;
   for (int known = PROBES; known > 0; --known)
     for (uint left = lane_bits(counts == known); left != 0; left &= left - 1) own->views[count++] = (ushort)lowest_lane(left);
@@ -154,7 +154,7 @@ INLINE uint open_chunks(const Grid* g, int3 tile, __global const float* layer_de
 
 // Asks a view of all chunks of a work item, one after the other: what is asked of one does not wait for another, and no branch has to be
 // guessed. Returns how many have entries left.
-INLINE uint ask_view(const View* view, __global const float* depths, uint chunks, __local Tile* own) {
+INLINE uint ask_view(const View* view, __global const ushort* depths, uint chunks, __local Tile* own) {
   const int lane = get_local_id(0), lanes = get_local_size(0);
   uint left = 0;
   for (uint n = 0; n < chunks; ++n) {
@@ -171,8 +171,8 @@ INLINE uint ask_view(const View* view, __global const float* depths, uint chunks
 
 // Asks the listed views of a tile's candidates, and drops those that one knows. The first views settle most of them; those left are listed
 // anew before more views are asked, FIRST_VIEWS at first, then twice as many and so on, so that vectors have few lanes to spare.
-INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views, __global const float* depths,
-                      __local Tile* own) {
+INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views,
+                      __global const ushort* depths, __local Tile* own) {
   for (uint first = 0, count = FIRST_VIEWS; first < own->view_count && own->entry_count != 0; first += count, count *= 2) {
     const uint last = min(first + count, own->view_count);
     uint chunks = open_chunks(g, tile, layer_depth, own);
@@ -192,7 +192,7 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
 //   out tile_views[tiles][groups of LANES views]: of tiles with candidates left: a bit for each view that may know something near them
 //   i/o candidates: those that a view knows are cleared
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
-                                const int view_count, __global const float* depths, __global const float* layer_depth,
+                                const int view_count, __global const ushort* depths, __global const float* layer_depth,
                                 __global ushort* tile_views, __global ulong* candidates) {
   const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + LANES - 1) / LANES;
@@ -207,7 +207,7 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
     if (tile_layers(own.layers, tile) == 0) continue;
     if (lane == 0) {
       list_entries(&own, tile);
-      list_likely_views(&g, tile, layer_depth, view_lanes, depths, &own);
+      list_likely_views(&g, tile, layer_depth, views, view_lanes, depths, &own);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&g, tile, layer_depth, views, depths, &own);

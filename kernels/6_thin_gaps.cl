@@ -26,7 +26,7 @@ INLINE void find_views_around(const Grid* g, __global const View* views, __globa
 }
 
 // Which of LANES points of this frame's camera, near candidates, does a kept view know?
-int16 any_view_knows(const ViewsAround* around, __global const float* depths, Points p, int16 asked) {
+int16 any_view_knows(const ViewsAround* around, __global const ushort* depths, Points p, int16 asked) {
   int16 open = asked;
   for (int group = 0; group < around->view_groups; ++group) {
     uint left = 0;
@@ -45,7 +45,7 @@ int16 any_view_knows(const ViewsAround* around, __global const float* depths, Po
 //       settle_candidates;  depths: their images;  voxels, directions: of find_directions
 //   i/o candidates: those with known space again `min_gap` behind them are cleared; 32-bit halves
 __kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, __global const ushort* tile_views,
-                         const int view_groups, __global const float* depths, __global const float* layer_depth,
+                         const int view_groups, __global const ushort* depths, __global const float* layer_depth,
                          __global const float* depth, __global const int* column_end, __global const int* voxels, const int count,
                          __global const float* directions, __global uint* candidates) {
   const int chunk = get_global_id(0);

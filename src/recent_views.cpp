@@ -7,6 +7,12 @@
 namespace frontier_surfels {
 namespace {
 
+/// Depths are kept as whole numbers of such steps [m]: a power of two, so that they are exact numbers again. 0.06 mm up to 4 m.
+double depth_step_for(double z_max) { return std::exp2(std::ceil(std::log2(z_max / 65536))); }
+
+/// Rounded down: what lies between is not claimed to have been seen.
+cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
+
 /// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
 std::vector<float> find_block_depths(const WorkingImage& image) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
@@ -24,19 +30,21 @@ std::vector<float> find_block_depths(const WorkingImage& image) {
   return blocks;
 }
 
-std::size_t squares(int pixels) { return (pixels + VIEW_SQUARE - 1) / VIEW_SQUARE; }
+constexpr int kPatch = PATCH_COLUMNS * PATCH_ROWS;
 
-/// A view's depths as the kernels read them: square by square, without the signs. What lies beyond the image's edges is 0.
-std::vector<float> by_squares(const WorkingImage& image) {
-  const int width = image.intrinsics.width, height = image.intrinsics.height;
-  std::vector<float> depths(squares(width) * squares(height) * VIEW_SQUARE * VIEW_SQUARE, 0.0F);
+int patches(int pixels, int side) { return (pixels + side - 1) / side; }
+
+/// A view's depths as the kernels read them: patch by patch, in steps, without the signs. What lies beyond the image's edges is 0.
+std::vector<cl_ushort> by_patches(const WorkingImage& image, float per_step) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS);
+  std::vector<cl_ushort> depths(static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch, 0);
   for (int t = 0; t < height; ++t) {
     const float* from = &image.depth[static_cast<std::size_t>(t) * width];
-    float* to = &depths[(t / VIEW_SQUARE * squares(width) * VIEW_SQUARE + t % VIEW_SQUARE) * VIEW_SQUARE];
+    cl_ushort* to = &depths[static_cast<std::size_t>(t / PATCH_ROWS) * columns * kPatch + t % PATCH_ROWS * PATCH_COLUMNS];
     int s = 0;
-    for (; s + VIEW_SQUARE <= width; s += VIEW_SQUARE, to += VIEW_SQUARE * VIEW_SQUARE)
-      for (int n = 0; n < VIEW_SQUARE; ++n) to[n] = std::abs(from[s + n]);
-    for (int n = 0; s + n < width; ++n) to[n] = std::abs(from[s + n]);
+    for (; s + PATCH_COLUMNS <= width; s += PATCH_COLUMNS, to += kPatch)
+      for (int n = 0; n < PATCH_COLUMNS; ++n) to[n] = to_steps(from[s + n], per_step);
+    for (int n = 0; s + n < width; ++n) to[n] = to_steps(from[s + n], per_step);
   }
   return depths;
 }
@@ -99,7 +107,12 @@ std::vector<std::size_t> spread(std::size_t count) {
 Transform to_transform(const Eigen::Isometry3d& T) { return to_transform(Eigen::Matrix<double, 3, 4>(T.matrix().topRows<3>())); }
 
 RecentViews::RecentViews(Commands& commands, const Config& config)
-    : config_(config), complete_(config.recent_views > 0), views_(commands), view_lanes_(commands), depths_(commands) {}
+    : config_(config),
+      depth_step_(depth_step_for(config.z_max)),
+      complete_(config.recent_views > 0),
+      views_(commands),
+      view_lanes_(commands),
+      depths_(commands) {}
 
 void RecentViews::clear(bool map_is_empty) {
   kept_.clear();
@@ -107,12 +120,10 @@ void RecentViews::clear(bool map_is_empty) {
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
-  std::vector<float> depths = by_squares(image);
-  const std::vector<float> blocks = find_block_depths(image);
-  const std::size_t pixels = depths.size();
-  depths.insert(depths.end(), blocks.begin(), blocks.end());
-  constexpr std::size_t kSquare = VIEW_SQUARE * VIEW_SQUARE;
-  depths.resize((depths.size() + kSquare - 1) / kSquare * kSquare);  // the squares of the next room must not lie across lines of the cache
+  const auto per_step = static_cast<float>(1 / depth_step_);
+  std::vector<cl_ushort> depths = by_patches(image, per_step);
+  for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
+  depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);  // the patches of the next room must not lie across lines of the cache
   if (depths.size() > room_size_) {
     // A larger image than ever before: the kept ones are few and soon replaced.
     clear(kept_.empty() && complete_);
@@ -122,7 +133,7 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   std::vector<bool> taken(config_.recent_views + 1, false);
   for (const Kept& kept : kept_) taken[kept.room] = true;
   const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
-  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room), pixels};
+  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
   depths_.send(std::move(depths), room * room_size_);
 }
 
@@ -132,7 +143,7 @@ View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_came
   view.width = kept.intrinsics.width;
   view.height = kept.intrinsics.height;
   view.first_pixel = static_cast<std::uint32_t>(kept.room * room_size_);
-  view.first_block = static_cast<std::uint32_t>(view.first_pixel + kept.pixels);
+  view.depth_step = static_cast<float>(depth_step_);
   return view;
 }
 

@@ -46,13 +46,13 @@ class RecentViews {
   struct Kept {
     Intrinsics intrinsics;
     Eigen::Isometry3d T_world_camera;
-    std::size_t room = 0;    ///< in the pool
-    std::size_t pixels = 0;  ///< of its image there; the largest depths of blocks are behind them
+    std::size_t room = 0;  ///< in the pool
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool adds_something() const;
 
   Config config_;
+  double depth_step_;          ///< [m]
   std::size_t room_size_ = 0;  ///< what the largest image so far takes
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
@@ -61,7 +61,7 @@ class RecentViews {
   SentArray<float> view_lanes_;
   /// [recent_views + 1][room_size_]: the kept views' images and the current one's; behind each the largest depth in each block of
   /// VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
-  DeviceArray<float> depths_;
+  DeviceArray<cl_ushort> depths_;
 };
 
 }  // namespace frontier_surfels

@@ -25,7 +25,7 @@ namespace {
 #define WINDOW_FIELDS(F) F(origin_x) F(origin_y) F(origin_z) F(size_x) F(size_y) F(size_z) F(block_size)
 #define VIEW_FIELDS(F)                                                                                                                    \
   F(to_image.r00) F(to_image.r01) F(to_image.r02) F(to_image.r10) F(to_image.r11) F(to_image.r12) F(to_image.r20) F(to_image.r21)         \
-  F(to_image.r22) F(to_image.t0) F(to_image.t1) F(to_image.t2) F(width) F(height) F(first_pixel) F(first_block)
+  F(to_image.r22) F(to_image.t0) F(to_image.t1) F(to_image.t2) F(width) F(height) F(first_pixel) F(depth_step)
 #define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
 #define LIMITS_FIELDS(F) \
   F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(min_gap) F(surface_depth) F(median_votes)

@@ -14,6 +14,11 @@ struct SeenView {
   Eigen::Isometry3d T_world_camera;
 };
 
+/// Views keep depths rounded down, to steps no longer than this up to 16 m [m].
+constexpr double kDepthStep = 16.0 / 65536;
+
+inline Truth less_than_depth(double z, double depth) { return less(z, depth - kDepthStep / 2, kDepthStep / 2 + 1e-5); }
+
 /// Does a view's camera see a point in its own frame: is the pixel there valid, and deeper?
 inline Truth camera_knows(const WorkingImage& image, const Vector3d& p) {
   if (p.z() <= 0) return p.z() > -1e-6 ? Truth::open : Truth::no;
@@ -27,7 +32,8 @@ inline Truth camera_knows(const WorkingImage& image, const Vector3d& p) {
       const double column = std::floor(s + ds + 0.5), row = std::floor(t + dt + 0.5);
       const bool inside = column >= 0 && row >= 0 && column < camera.width && row < camera.height;
       const Truth known =
-          inside ? less(p.z(), std::abs(image.depth[static_cast<int>(row) * camera.width + static_cast<int>(column)]), 1e-5) : Truth::no;
+          inside ? less_than_depth(p.z(), std::abs(image.depth[static_cast<int>(row) * camera.width + static_cast<int>(column)]))
+                 : Truth::no;
       yes = yes || known == Truth::yes;
       no = no || known == Truth::no;
       open = open || known == Truth::open;
