@@ -113,7 +113,7 @@ typedef struct {
 } Window;
 
 // A kept view: what its camera sees of this frame's, and where its depths start in the pool; behind them the largest depths of its blocks.
-// Depths are whole numbers of steps, 16 bits each.
+// Depths are whole numbers of steps, 16 bits each, rounded down; the step is the same for all views.
 typedef struct {
   Transform to_image;  // this frame's camera -> (x, y, z): in the view's camera at depth z, in column x / z and row y / z, rounded down
   SHARED_INT width, height;

@@ -34,7 +34,7 @@ INLINE Points surfel_normals(const Grid* g, const View* view, __global const ush
   Points best = mean;
   float16 best_cosine = -1.0f;
   for (int dk = -1; dk <= 1; ++dk) {
-    Layer layer;
+    LayerOffsets layer;
     layer_around(g, layer_depth, v, center, dk, &layer);
     for (int n = 0; n < 9; ++n) {
       int16 better = *ragged & ((around & 1 << AROUND(n % 3 - 1, n / 3 - 1, dk)) != 0);

@@ -104,7 +104,7 @@ INLINE uint16 view_pixels(uint16 width, uint16 column, uint16 row) {
   return (patch * PATCH_ROWS + row % PATCH_ROWS) * PATCH_COLUMNS + column % PATCH_COLUMNS;
 }
 
-// Depths of pixels [m]. Two of them are read at a time: there is an instruction for it.
+// Depths of pixels [m]. Read as numbers of 32 bits, two pixels each, the even one in the lower half: none of 16 bits can be gathered.
 INLINE float16 view_depths(__global const ushort* depths, int16 pixel, float step) {
   const int16 two = gather_int((__global const int*)depths, pixel >> 1);
   return convert_float16(two >> ((pixel & 1) << 4) & 0xffff) * step;

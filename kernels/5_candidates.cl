@@ -22,15 +22,17 @@ INLINE Points voxel_centers(const Grid* g, __global const float* layer_depth, Vo
   return p;
 }
 
-// The 27 voxels around a voxel in one number: a bit AROUND(di, dj, dk) for each.
+// The 27 voxels around a voxel in one number: a bit AROUND(di, dj, dk) for each. The three of a column are beside each other, as in its
+// words.
 #define AROUND(di, dj, dk) (3 * (3 * ((dj) + 1) + (di) + 1) + (dk) + 1)
 
-// From the centre of a voxel to those of the voxels around it in layer dk: x[di + 1], y[dj + 1], z.
+// From the centre of a voxel to those of the voxels around it in one layer: x[di + 1], y[dj + 1], z.
 typedef struct {
   float16 x[3], y[3], z;
-} Layer;
+} LayerOffsets;
 
-INLINE void layer_around(const Grid* g, __global const float* layer_depth, Voxels v, Points center, int dk, Layer* layer) {
+// x depends on i and the layer alone, and y on j.
+INLINE void layer_around(const Grid* g, __global const float* layer_depth, Voxels v, Points center, int dk, LayerOffsets* layer) {
   for (int n = 0; n < 3; ++n) {
     const Points u = voxel_centers(g, layer_depth, (Voxels){v.i + n - 1, v.j + n - 1, v.k + dk});
     layer->x[n] = u.x - center.x;
@@ -39,10 +41,11 @@ INLINE void layer_around(const Grid* g, __global const float* layer_depth, Voxel
   }
 }
 
-// The observed ones of the layers bit - 1, bit and bit + 1 of a column, whose word is `at`; the next word may have the first or the last.
+// Which of the layers bit - 1, bit and bit + 1 of a column, whose word is `at`, are observed: bits 0, 1, 2. The word before may have the
+// first of them, the next one the last.
 INLINE int observed_layers(const Grid* g, __global const ulong* observed, int at, int w, int bit) {
   if (bit > 0 && bit < 63) return (int)(observed[at] >> (bit - 1)) & 7;
-  if (bit == 0) return (int)(observed[at] << 1) & 6 | (w > 0 ? (int)(observed[at - g->size_i] >> 63) : 0);
+  if (bit == 0) return ((int)(observed[at] << 1) & 6) | (w > 0 ? (int)(observed[at - g->size_i] >> 63) : 0);
   return (int)(observed[at] >> 62) | (w + 1 < g->words_k ? (int)(observed[at + g->size_i] & 1) << 2 : 0);
 }
 
@@ -85,7 +88,7 @@ __kernel void find_directions(const Grid g, __global const float* layer_depth, _
   const Points center = voxel_centers(&g, layer_depth, v);
   Points sum = {0.0f, 0.0f, 0.0f};
   for (int dk = -1; dk <= 1; ++dk) {
-    Layer layer;
+    LayerOffsets layer;
     layer_around(&g, layer_depth, v, center, dk, &layer);
     for (int n = 0; n < 9; ++n) {
       const int16 is_set = (bits & 1 << AROUND(n % 3 - 1, n / 3 - 1, dk)) != 0;

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace frontier_surfels {
 namespace {
 
-/// Depths are kept as whole numbers of such steps [m]: a power of two, so that they are exact numbers again. 0.06 mm up to 4 m.
-double depth_step_for(double z_max) { return std::exp2(std::ceil(std::log2(z_max / 65536))); }
-
-/// Rounded down: what lies between is not claimed to have been seen.
+/// Rounded down: what lies between is not claimed to have been seen. z_max itself may be one step more than there are.
 cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
 
 /// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
@@ -104,6 +102,8 @@ std::vector<std::size_t> spread(std::size_t count) {
 
 }  // namespace
 
+double depth_step_for(double z_max) { return std::exp2(std::ceil(std::log2(z_max / 65536))); }
+
 Transform to_transform(const Eigen::Isometry3d& T) { return to_transform(Eigen::Matrix<double, 3, 4>(T.matrix().topRows<3>())); }
 
 RecentViews::RecentViews(Commands& commands, const Config& config)
@@ -123,8 +123,13 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   const auto per_step = static_cast<float>(1 / depth_step_);
   std::vector<cl_ushort> depths = by_patches(image, per_step);
   for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
-  depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);  // the patches of the next room must not lie across lines of the cache
+  // The patches of the next room must not lie across lines of the cache; and pixels are read two at a time.
+  depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
   if (depths.size() > room_size_) {
+    const double pixels = static_cast<double>(config_.recent_views + 1) * static_cast<double>(depths.size());
+    if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
+      throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
+                     " billion pixels, more than 2; raise decimation or lower recent_views.");
     // A larger image than ever before: the kept ones are few and soon replaced.
     clear(kept_.empty() && complete_);
     depths_.allocate((config_.recent_views + 1) * depths.size());

@@ -15,11 +15,16 @@ namespace frontier_surfels {
 /// T as the kernels take it.
 Transform to_transform(const Eigen::Isometry3d& T);
 
+/// Depths of views are kept as whole numbers of such steps [m]: a power of two, so that they are exact numbers again; at most z_max /
+/// 32768.
+double depth_step_for(double z_max);
+
 class RecentViews {
  public:
   RecentViews(Commands& commands, const Config& config);
 
   /// Sends this frame's depths to the device; they are own_view()'s until the next call.
+  /// @throws BadFrame  the image is too large for as many views as are kept
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
   View own_view() const;  ///< this frame's, as its own camera sees it
 
@@ -59,8 +64,8 @@ class RecentViews {
   bool complete_;
   SentArray<View> views_;
   SentArray<float> view_lanes_;
-  /// [recent_views + 1][room_size_]: the kept views' images and the current one's; behind each the largest depth in each block of
-  /// VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
+  /// [recent_views + 1][room_size_]: the kept views' images and the current one's, in steps of depth_step_; behind each the largest depth
+  /// in each block of VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
   DeviceArray<cl_ushort> depths_;
 };
 

@@ -89,7 +89,7 @@ struct Scene {
 /// Distance of the point before a new surfel where known space is expected: 7/4 r.
 double front_distance(const Scene& scene, const Vector3d& center) { return 1.75 * std::sqrt(3.0) / 2 * scene.grid.voxel_size(center.z()); }
 
-Truth current_view_knows(const Scene& scene, const Vector3d& p_camera) { return camera_knows(scene.current.image, p_camera); }
+Truth current_view_knows(const Scene& scene, const Vector3d& p_camera) { return camera_knows(scene.current, p_camera); }
 
 /// What a predicate says of a point that may lie so far from where it is said to [m].
 template <typename Predicate>
@@ -154,12 +154,13 @@ double check_place(const Scene& scene, const Vector3i& v, const Vector3d& normal
 Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& random) {
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
+  const double depth_step = depth_step_for(camera.config.z_max);
   for (int frame = 0; frame < 3; ++frame) {
-    scene.kept.push_back({random_image(camera, Content::mixed, random), T_world_start * random.pose(0.3, 0.4)});
+    scene.kept.push_back({random_image(camera, Content::mixed, random), T_world_start * random.pose(0.3, 0.4), depth_step});
     probe.views().set_current(scene.kept.back().image, scene.kept.back().T_world_camera);
     EXPECT_TRUE(probe.views().keep_current());
   }
-  scene.current = {random_image(camera, Content::all_valid, random), T_world_start};
+  scene.current = {random_image(camera, Content::all_valid, random), T_world_start, depth_step};
   probe.stages().begin_frame(scene.current.image, T_world_start, 5);
   scene.observed = random_field(probe.grid(), 0.2, random);
   probe.stages().find_candidates();

@@ -14,7 +14,7 @@ using namespace reference;
 /// An image of a wall, a little rough and with holes: unlike random depths it hides what is behind, so that tiles need not ask the view.
 WorkingImage wall_image(const Camera& camera, Random& random) {
   WorkingImage image = random_image(camera, Content::all_invalid, random);
-  const double distance = random.uniform(camera.config.z_min, 1.2 * camera.config.z_max);
+  const double distance = random.uniform(camera.config.z_min, camera.config.z_max);  // working images have nothing beyond
   for (float& d : image.depth)
     if (random.chance(0.9))
       d = static_cast<float>(std::min(distance * random.uniform(0.98, 1.02), camera.config.z_max)) * (random.chance(0.1) ? -1.0F : 1.0F);
@@ -34,7 +34,8 @@ double check(Camera camera, int frames, int kept, Content content, double densit
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
   for (int frame = 0; frame < frames; ++frame) {
     views.push_back({walls ? wall_image(camera, random) : random_image(camera, content, random),
-                     T_world_start * (walls ? random.pose(0.8 * camera.config.z_max, M_PI) : random.pose(0.5, 0.6))});
+                     T_world_start * (walls ? random.pose(0.8 * camera.config.z_max, M_PI) : random.pose(0.5, 0.6)),
+                     depth_step_for(camera.config.z_max)});
     probe.views().set_current(views.back().image, views.back().T_world_camera);
     EXPECT_EQ(probe.views().keep_current(), kept > 0);
   }
@@ -134,13 +135,56 @@ TEST(StageRecentViews, CompleteUntilOneIsForgotten) {
   }
 }
 
+/// Whole steps of depth, rounded down, patch by patch, and behind them the largest of each block: of odd sizes, and with as many steps as
+/// there are.
+TEST(StageRecentViews, StoredDepths) {
+  for (Camera camera : cameras()) {
+    for (const double z_max : {camera.config.z_max, 4.0}) {
+      SCOPED_TRACE(camera.name + ", z_max " + std::to_string(z_max));
+      camera.config.z_max = z_max;
+      Random random(5);
+      StagesProbe probe(camera.config);
+      const WorkingImage image = random_image(camera, Content::mixed, random);
+      probe.views().set_current(image, Eigen::Isometry3d::Identity());
+      const int width = image.intrinsics.width, height = image.intrinsics.height;
+      const auto up = [](int size, int part) { return (size + part - 1) / part; };
+      const int patches_i = up(width, 8), blocks_i = up(width, VIEW_BLOCK), pixels = 32 * patches_i * up(height, 4);
+      std::vector<cl_ushort> stored(pixels + blocks_i * up(height, VIEW_BLOCK));
+      test_commands().queue().enqueueReadBuffer(probe.views().depths(), CL_TRUE, probe.views().own_view().first_pixel * sizeof(cl_ushort),
+                                                stored.size() * sizeof(cl_ushort), stored.data());
+      std::vector<double> expected(stored.size(), 0);
+      for (int t = 0; t < height; ++t)
+        for (int s = 0; s < width; ++s) {
+          double& largest = expected[pixels + t / VIEW_BLOCK * blocks_i + s / VIEW_BLOCK];
+          double& pixel = expected[32 * (t / 4 * patches_i + s / 8) + 8 * (t % 4) + s % 8];
+          pixel = kept_steps(image.depth[t * width + s], depth_step_for(z_max));
+          largest = std::max(largest, pixel);
+        }
+      EXPECT_EQ(std::vector<double>(stored.begin(), stored.end()), expected);
+    }
+  }
+}
+
+/// More pixels than can be numbered are refused, and a smaller image is taken afterwards.
+TEST(StageRecentViews, TooManyPixels) {
+  Config config;
+  config.recent_views = 1024;
+  Random random(6);
+  StagesProbe probe(config);
+  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
+  const WorkingImage large = random_image(make_camera(1500, 1400, 300, 300, 45), Content::all_invalid, random);
+  EXPECT_THROW(probe.views().set_current(large, here), BadFrame);
+  probe.views().set_current(random_image(cameras().front(), Content::all_valid, random), here);
+  EXPECT_TRUE(probe.views().keep_current());
+}
+
 /// A larger image than ever before has no room beside the kept ones: they go, and nothing is mixed up.
 TEST(StageRecentViews, LargerImages) {
   const Camera small = cameras().front(), large = make_camera(20, 15, 15.1, 15.3, 45);
   Random random(2);
   StagesProbe probe(small.config);
   const Eigen::Isometry3d near = random.pose(0.1, 0.1), here = Eigen::Isometry3d::Identity();
-  const SeenView before = {random_image(small, Content::all_valid, random), near};
+  const SeenView before = {random_image(small, Content::all_valid, random), near, depth_step_for(small.config.z_max)};
   probe.views().set_current(before.image, near);
   EXPECT_TRUE(probe.views().keep_current());
   probe.stages().begin_frame(random_image(large, Content::all_valid, random), here, 2);

@@ -67,7 +67,7 @@ Marked check_marks(Camera camera, Content content, int count, double density, bo
   Random random(static_cast<unsigned>(count));
   const Nuvg grid(camera.intrinsics, camera.config);
   StagesProbe probe(camera.config);
-  const SeenView view = {random_image(camera, content, random), random.pose(2, 3)};
+  const SeenView view = {random_image(camera, content, random), random.pose(2, 3), depth_step_for(camera.config.z_max)};
   probe.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
   const std::vector<Surfel> map = probe.map().download();
   if (count > 10) probe.kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot

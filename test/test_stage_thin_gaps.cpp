@@ -38,7 +38,7 @@ Truth closes(const Scene& scene, const Vector3i& v, Tally& tally) {
   const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z()), sum = sum_of_directions(scene.grid, scene.observed, v);
   if (less(sum.norm(), 0.01, 1e-4) == Truth::yes) return Truth::no;
   const Vector3d behind = center - config.min_gap * sum.normalized();
-  const Truth by_current = camera_knows(scene.current.image, behind);
+  const Truth by_current = camera_knows(scene.current, behind);
   const Truth by_kept = any_knows(scene.kept, scene.current.T_world_camera * behind);
   const Truth surface = at_surface(scene.grid, scene.current.image, scene.layer_depth, config.surface_depth, v, center.z());
   const Truth known = by_current || by_kept;
@@ -61,13 +61,14 @@ struct Setup {
 Scene prepare(Camera camera, const Setup& setup, double observed_density, StagesProbe& probe, Random& random) {
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
+  const double depth_step = depth_step_for(camera.config.z_max);
   for (int frame = 0; frame < setup.frames; ++frame) {
-    const SeenView view = {random_image(camera, setup.content, random), T_world_start * random.pose(0.5, 0.6)};
+    const SeenView view = {random_image(camera, setup.content, random), T_world_start * random.pose(0.5, 0.6), depth_step};
     probe.views().set_current(view.image, view.T_world_camera);
     EXPECT_EQ(probe.views().keep_current(), setup.recent_views > 0);
     if (setup.recent_views > 0) scene.kept.push_back(view);
   }
-  scene.current = {random_image(camera, setup.content, random), T_world_start};
+  scene.current = {random_image(camera, setup.content, random), T_world_start, depth_step};
   probe.stages().begin_frame(scene.current.image, T_world_start, 2);
   probe.stages().observe_space();  // where the columns end
   if (observed_density >= 0) probe.set_observed(random_field(probe.grid(), observed_density, random));

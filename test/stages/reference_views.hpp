@@ -12,17 +12,16 @@ namespace frontier_surfels::reference {
 struct SeenView {
   WorkingImage image;
   Eigen::Isometry3d T_world_camera;
+  double depth_step;  ///< depths are kept rounded down to a multiple of it [m]
 };
 
-/// Views keep depths rounded down, to steps no longer than this up to 16 m [m].
-constexpr double kDepthStep = 16.0 / 65536;
-
-inline Truth less_than_depth(double z, double depth) { return less(z, depth - kDepthStep / 2, kDepthStep / 2 + 1e-5); }
+/// Steps that a depth is kept as, 16 bits.
+inline double kept_steps(float depth, double depth_step) { return std::min(std::floor(std::abs(depth) / depth_step), 65535.0); }
 
 /// Does a view's camera see a point in its own frame: is the pixel there valid, and deeper?
-inline Truth camera_knows(const WorkingImage& image, const Vector3d& p) {
+inline Truth camera_knows(const SeenView& view, const Vector3d& p) {
   if (p.z() <= 0) return p.z() > -1e-6 ? Truth::open : Truth::no;
-  const Intrinsics& camera = image.intrinsics;
+  const Intrinsics& camera = view.image.intrinsics;
   const double s = p.x() * camera.fx / p.z() + camera.cx, t = p.y() * camera.fy / p.z() + camera.cy;
   // What float leaves open: by how many pixels the point may be elsewhere.
   const double tolerance = 1e-4 + 4e-6 / p.z() * (camera.fx + camera.fy) * (1 + p.norm() / p.z());
@@ -31,9 +30,8 @@ inline Truth camera_knows(const WorkingImage& image, const Vector3d& p) {
     for (const double dt : {-tolerance, tolerance}) {
       const double column = std::floor(s + ds + 0.5), row = std::floor(t + dt + 0.5);
       const bool inside = column >= 0 && row >= 0 && column < camera.width && row < camera.height;
-      const Truth known =
-          inside ? less_than_depth(p.z(), std::abs(image.depth[static_cast<int>(row) * camera.width + static_cast<int>(column)]))
-                 : Truth::no;
+      const auto depth = [&] { return view.image.depth[static_cast<int>(row) * camera.width + static_cast<int>(column)]; };
+      const Truth known = inside ? less(p.z(), kept_steps(depth(), view.depth_step) * view.depth_step, 1e-5) : Truth::no;
       yes = yes || known == Truth::yes;
       no = no || known == Truth::no;
       open = open || known == Truth::open;
@@ -42,7 +40,7 @@ inline Truth camera_knows(const WorkingImage& image, const Vector3d& p) {
 }
 
 inline Truth view_knows(const SeenView& view, const Vector3d& p_world) {
-  return camera_knows(view.image, view.T_world_camera.inverse() * p_world);
+  return camera_knows(view, view.T_world_camera.inverse() * p_world);
 }
 
 inline Truth any_knows(const std::vector<SeenView>& views, const Vector3d& p_world) {
