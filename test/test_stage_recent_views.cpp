@@ -14,10 +14,9 @@ using namespace reference;
 /// An image of a wall, a little rough and with holes: unlike random depths it hides what is behind, so that tiles need not ask the view.
 WorkingImage wall_image(const Camera& camera, Random& random) {
   WorkingImage image = random_image(camera, Content::all_invalid, random);
-  const double distance = random.uniform(camera.config.z_min, camera.config.z_max);  // working images have nothing beyond
+  const double distance = random.uniform(camera.config.z_min, 1.2 * camera.config.z_max);
   for (float& d : image.depth)
-    if (random.chance(0.9))
-      d = static_cast<float>(std::min(distance * random.uniform(0.98, 1.02), camera.config.z_max)) * (random.chance(0.1) ? -1.0F : 1.0F);
+    if (random.chance(0.9)) d = static_cast<float>(distance * random.uniform(0.98, 1.02)) * (random.chance(0.1) ? -1.0F : 1.0F);
   return image;
 }
 
