@@ -3,13 +3,13 @@
 #include <chrono>
 #include <utility>
 
+#include "frame/recent_views.hpp"
+#include "frame/working_image.hpp"
 #include "frontier_surfels/ply.hpp"
-#include "map_archive.hpp"
+#include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
-#include "recent_views.hpp"
-#include "stages.hpp"
-#include "surfel_map.hpp"
-#include "working_image.hpp"
+#include "stages/stages.hpp"
+#include "storage/map_archive.hpp"
 
 namespace frontier_surfels {
 namespace {

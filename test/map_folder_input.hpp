@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
-#include "map_folder.hpp"
+#include "storage/map_folder.hpp"
 
 namespace frontier_surfels {
 

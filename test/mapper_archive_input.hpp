@@ -7,10 +7,10 @@
 #include <tuple>
 
 #include "frontier_surfels/ply.hpp"
-#include "map_folder.hpp"
-#include "map_window.hpp"
+#include "map/map_window.hpp"
+#include "map/surfel_packing.hpp"
 #include "mapper_input.hpp"
-#include "surfel_packing.hpp"
+#include "storage/map_folder.hpp"
 
 namespace frontier_surfels {
 

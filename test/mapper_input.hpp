@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "frontier_surfels/mapper.hpp"
-#include "frontier_surfels/replay/synthetic_room.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
+#include "synthetic/synthetic_room.hpp"
 
 namespace frontier_surfels {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "block_index.hpp"
+#include "map/block_index.hpp"
 #include "stages/random_input.hpp"
 
 namespace frontier_surfels {

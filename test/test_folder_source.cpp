@@ -7,7 +7,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "frontier_surfels/replay/frame_source.hpp"
+#include "recordings/frame_source.hpp"
 
 namespace fs = std::filesystem;
 using frontier_surfels::DepthFrame;

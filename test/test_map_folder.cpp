@@ -10,7 +10,7 @@
 #include <unordered_set>
 
 #include "map_folder_input.hpp"
-#include "sqlite.hpp"
+#include "storage/sqlite.hpp"
 
 namespace frontier_surfels {
 namespace {

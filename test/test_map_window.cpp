@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "map_window.hpp"
+#include "map/map_window.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/stages_probe.hpp"
 

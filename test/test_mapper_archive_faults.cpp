@@ -11,7 +11,7 @@
 
 #include "file_size_limit.hpp"
 #include "mapper_archive_input.hpp"
-#include "sqlite.hpp"
+#include "storage/sqlite.hpp"
 
 namespace frontier_surfels {
 namespace {

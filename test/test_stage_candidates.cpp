@@ -1,4 +1,4 @@
-/// kernels/5_candidates.cl, exactly, against eq. (13) one voxel at a time.
+/// kernels/stages/2_candidates.cl, exactly, against eq. (13) one voxel at a time.
 
 #include <gtest/gtest.h>
 

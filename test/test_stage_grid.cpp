@@ -1,11 +1,11 @@
-/// kernels/1_grid.cl: F, F^-1 and the bit operations on the device against double precision and loops over bits.
+/// kernels/common/grid.cl: F, F^-1 and the bit operations on the device against double precision and loops over bits.
 
 #include <gtest/gtest.h>
 
-#include "recent_views.hpp"
+#include "frame/recent_views.hpp"
+#include "frame/view_grid.hpp"
 #include "stages/reference_grid.hpp"
 #include "stages/test_kernels.hpp"
-#include "view_grid.hpp"
 
 namespace frontier_surfels {
 namespace {

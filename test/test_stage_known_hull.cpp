@@ -1,4 +1,4 @@
-/// kernels/8_known_hull.cl against the projection of every surfel onto every cell of every face.
+/// kernels/stages/10_known_hull.cl against the projection of every surfel onto every cell of every face.
 
 #include <gtest/gtest.h>
 

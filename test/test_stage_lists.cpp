@@ -1,4 +1,4 @@
-/// kernels/13_lists.cl: prefix sums and lists of set bits, exactly.
+/// kernels/common/lists.cl: prefix sums and lists of set bits, exactly.
 
 #include <gtest/gtest.h>
 

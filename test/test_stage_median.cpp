@@ -1,4 +1,4 @@
-/// kernels/10_median.cl, exactly, against the count of the 27 voxels.
+/// kernels/stages/12_median.cl, exactly, against the count of the 27 voxels.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/2_observed_space.cl against the literal loop over pixels and layers.
+/// kernels/stages/1_observed_space.cl against the literal loop over pixels and layers.
 
 #include <gtest/gtest.h>
 

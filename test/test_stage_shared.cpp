@@ -1,4 +1,4 @@
-/// kernels/0_shared.h: host and device lay the structures out alike.
+/// kernels/common/shared.h: host and device lay the structures out alike.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/7_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
+/// kernels/stages/9_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include <map>
 #include <optional>
 
+#include "frame/view_grid.hpp"
 #include "stages/reference_paths.hpp"
 #include "stages/reference_sign_field.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/stages_probe.hpp"
-#include "view_grid.hpp"
 
 namespace frontier_surfels {
 namespace {

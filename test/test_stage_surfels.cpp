@@ -1,11 +1,11 @@
-/// kernels/1_surfels.cl: LANES surfels at a time against one after the other; packing is tested in test_surfel_packing.
+/// kernels/common/surfels.cl: LANES surfels at a time against one after the other; packing is tested in test_surfel_packing.
 
 #include <gtest/gtest.h>
 
-#include "recent_views.hpp"
+#include "frame/recent_views.hpp"
+#include "frame/view_grid.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/test_kernels.hpp"
-#include "view_grid.hpp"
 
 namespace frontier_surfels {
 namespace {

@@ -1,4 +1,4 @@
-/// kernels/3_surfels_in_view.cl: which surfels reach into the grid, how it sees them, and their split.
+/// kernels/stages/3_visit.cl: which surfels reach into the grid, how it sees them, and their split.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/9_sweeps.cl, exactly, against Algorithm 1 walked one path at a time on random events.
+/// kernels/stages/11_sweeps.cl, exactly, against Algorithm 1 walked one path at a time on random events.
 
 #include <gtest/gtest.h>
 

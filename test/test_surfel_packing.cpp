@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "map_window.hpp"
+#include "map/map_window.hpp"
+#include "map/surfel_packing.hpp"
 #include "stages/random_input.hpp"
 #include "stages/test_kernels.hpp"
-#include "surfel_packing.hpp"
 
 namespace frontier_surfels {
 namespace {

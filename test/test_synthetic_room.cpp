@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "frontier_surfels/replay/synthetic_room.hpp"
+#include "synthetic/synthetic_room.hpp"
 
 using Eigen::Vector3d;
 using frontier_surfels::Intrinsics;

@@ -4,10 +4,10 @@
 #include <iostream>
 #include <thread>
 
+#include "apps/command.hpp"
+#include "apps/interrupt.hpp"
 #include "bench/sections.hpp"
 #include "frontier_surfels/mapper.hpp"
-#include "replay/command.hpp"
-#include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {

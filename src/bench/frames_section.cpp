@@ -1,10 +1,10 @@
 /// Whole frames: sizes of the working image, depth ranges, threads.
 #include <algorithm>
 
+#include "apps/interrupt.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
-#include "replay/interrupt.hpp"
 
 namespace frontier_surfels::bench {
 namespace {

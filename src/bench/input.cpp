@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "frontier_surfels/replay/synthetic_room.hpp"
+#include "synthetic/synthetic_room.hpp"
 
 namespace frontier_surfels::bench {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/options.hpp"
-#include "frontier_surfels/replay/frame_source.hpp"
+#include "recordings/frame_source.hpp"
 
 namespace frontier_surfels::bench {
 

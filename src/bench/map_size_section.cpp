@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "apps/interrupt.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
-#include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {

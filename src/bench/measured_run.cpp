@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "replay/interrupt.hpp"
+#include "apps/interrupt.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {

@@ -1,8 +1,8 @@
 /// OctoMap's insertion beside the mapper, frame by frame, so that whatever disturbs the machine disturbs both.
+#include "apps/interrupt.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
-#include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {

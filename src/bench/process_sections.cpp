@@ -4,11 +4,11 @@
 #include <chrono>
 #include <filesystem>
 
+#include "apps/interrupt.hpp"
 #include "bench/child_process.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
-#include "replay/interrupt.hpp"
 
 namespace frontier_surfels::bench {
 namespace {

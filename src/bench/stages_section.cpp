@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
+#include "apps/interrupt.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "bench/table.hpp"
-#include "replay/interrupt.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {

@@ -3,10 +3,10 @@
 
 #include <memory>
 
+#include "recordings/bag_source.hpp"
 #include "replay/bag_player.hpp"
-#include "replay/bag_source.hpp"
 #include "replay/live_replay.hpp"
-#include "ros/running_mapper.hpp"
+#include "ros/client/running_mapper.hpp"
 
 namespace frontier_surfels::replay {
 

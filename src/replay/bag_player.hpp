@@ -10,9 +10,9 @@
 #include <set>
 #include <string>
 
-#include "replay/bag_source.hpp"
-#include "replay/bag_streams.hpp"
-#include "ros/running_mapper.hpp"
+#include "recordings/bag_source.hpp"
+#include "recordings/bag_streams.hpp"
+#include "ros/client/running_mapper.hpp"
 
 namespace frontier_surfels::replay {
 

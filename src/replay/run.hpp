@@ -8,10 +8,10 @@
 
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/mapper.hpp"
-#include "frontier_surfels/replay/frame_source.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 #include "frontier_surfels/types.hpp"
+#include "recordings/frame_source.hpp"
 
 namespace frontier_surfels::replay {
 

@@ -16,10 +16,10 @@
 
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/ply.hpp"
-#include "ros/frame_reader.hpp"
-#include "ros/map_publisher.hpp"
-#include "ros/mapper_diagnostics.hpp"
-#include "ros/surfel_messages.hpp"
+#include "ros/input/frame_reader.hpp"
+#include "ros/output/map_publisher.hpp"
+#include "ros/output/mapper_diagnostics.hpp"
+#include "ros/output/surfel_messages.hpp"
 #include "ros/worker.hpp"
 
 namespace frontier_surfels {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "exact_test_boundary.hpp"
-#include "exact_test_surfels.hpp"
-#include "exact_test_view.hpp"
+#include "scoring/exact_test_boundary.hpp"
+#include "scoring/exact_test_surfels.hpp"
+#include "scoring/exact_test_view.hpp"
 
 namespace frontier_surfels::scoring {
 

@@ -1,12 +1,12 @@
-#include "exact_test_boundary.hpp"
+#include "scoring/exact_test_boundary.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <random>
 
-#include "parallel.hpp"
-#include "surfel_tree.hpp"
+#include "scoring/parallel.hpp"
+#include "scoring/surfel_tree.hpp"
 
 namespace frontier_surfels::scoring {
 

@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include "exact_test_view.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
+#include "scoring/exact_test_view.hpp"
 
 namespace frontier_surfels::scoring {
 

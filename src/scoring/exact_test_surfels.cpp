@@ -1,11 +1,11 @@
-#include "exact_test_surfels.hpp"
+#include "scoring/exact_test_surfels.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "parallel.hpp"
+#include "scoring/parallel.hpp"
 
 namespace frontier_surfels::scoring {
 

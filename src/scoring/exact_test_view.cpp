@@ -1,4 +1,4 @@
-#include "exact_test_view.hpp"
+#include "scoring/exact_test_view.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -3,7 +3,7 @@
 
 #include <octomap/Pointcloud.h>
 
-#include "decimated_depth.hpp"
+#include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels::scoring {
 

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <future>
 
-#include "cpu_clock.hpp"
-#include "octomap_cloud.hpp"
-#include "surfel_tree.hpp"
+#include "scoring/cpu_clock.hpp"
+#include "scoring/octomap_cloud.hpp"
+#include "scoring/surfel_tree.hpp"
 
 namespace frontier_surfels::scoring {
 

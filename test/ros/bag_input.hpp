@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "frontier_surfels/replay/frame_source.hpp"
+#include "recordings/frame_source.hpp"
 
 namespace frontier_surfels::replay {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "frontier_surfels/replay/synthetic_room.hpp"
-#include "replay/bag_writer.hpp"
+#include "recordings/bag_writer.hpp"
 #include "ros/bag_input.hpp"
+#include "synthetic/synthetic_room.hpp"
 
 namespace frontier_surfels::replay {
 namespace {

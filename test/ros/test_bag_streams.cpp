@@ -7,8 +7,8 @@
 #include <random>
 
 #include "bag_input.hpp"
-#include "replay/bag_streams.hpp"
-#include "replay/bag_topics.hpp"
+#include "recordings/bag_streams.hpp"
+#include "recordings/bag_topics.hpp"
 
 namespace frontier_surfels::replay {
 namespace {

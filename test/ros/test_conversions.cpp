@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "ros/bag_input.hpp"
-#include "ros/conversions.hpp"
+#include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
 

@@ -7,8 +7,8 @@
 #include <tuple>
 
 #include "ros/marker_scene.hpp"
+#include "ros/output/surfel_markers.hpp"
 #include "ros/surfel_input.hpp"
-#include "ros/surfel_markers.hpp"
 
 namespace frontier_surfels {
 namespace {

@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "mapper_input.hpp"
-#include "ros/serialized.hpp"
+#include "ros/output/serialized.hpp"
+#include "ros/output/surfel_messages.hpp"
 #include "ros/surfel_input.hpp"
-#include "ros/surfel_messages.hpp"
 
 namespace frontier_surfels::messages {
 namespace {

@@ -4,9 +4,9 @@
 #include <map>
 
 #include "mapper_input.hpp"
-#include "ros/map_publisher.hpp"
+#include "ros/output/map_publisher.hpp"
+#include "ros/output/surfel_mirror.hpp"
 #include "ros/surfel_input.hpp"
-#include "ros/surfel_mirror.hpp"
 
 namespace frontier_surfels {
 namespace {

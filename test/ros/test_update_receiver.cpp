@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "ros/map_subscriber.hpp"
-#include "ros/surfel_messages.hpp"
+#include "ros/client/map_subscriber.hpp"
+#include "ros/output/surfel_messages.hpp"
 
 namespace frontier_surfels {
 namespace {

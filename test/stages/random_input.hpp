@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "frame/working_image.hpp"
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 #include "reference_field.hpp"
-#include "working_image.hpp"
 
 namespace frontier_surfels::reference {
 

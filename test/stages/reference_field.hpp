@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "0_shared.h"
+#include "common/shared.h"
 
 namespace frontier_surfels::reference {
 
@@ -55,7 +55,7 @@ void for_each_voxel(const SizedT& sized, Visitor&& visit) {
       for (int k = 0; k < sized.size_k; ++k) visit(i, j, k);
 }
 
-/// Bit field of 1_grid: word (j words_k + w) size_i + i, bit k % 64 of word k / 64.
+/// Bit field of common/grid: word (j words_k + w) size_i + i, bit k % 64 of word k / 64.
 template <typename T>
 std::vector<std::uint64_t> pack(const Field<T>& field) {
   const std::size_t words_k = (field.size_k + 63) / 64;

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
-#include "map_window.hpp"
+#include "map/map_window.hpp"
+#include "map/surfel_packing.hpp"
 #include "random_input.hpp"
 #include "reference_grid.hpp"
-#include "surfel_packing.hpp"
 
 namespace frontier_surfels::reference {
 

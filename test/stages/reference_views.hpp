@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "frame/working_image.hpp"
 #include "reference_grid.hpp"
-#include "working_image.hpp"
 
 namespace frontier_surfels::reference {
 

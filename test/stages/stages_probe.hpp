@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "frame/recent_views.hpp"
+#include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "random_input.hpp"
-#include "recent_views.hpp"
 #include "reference_field.hpp"
-#include "stages.hpp"
-#include "surfel_map.hpp"
+#include "stages/stages.hpp"
 
 namespace frontier_surfels {
 

@@ -1,0 +1,138 @@
+// The pages of the map: where new surfels go, what a frame has changed, and pages for the host. The map is described in common/surfels.
+//
+// New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: the same on any
+// number of threads. For that they are sorted by cell (block of the window), the list's order kept in each.
+
+// One work item a slot of a list of bits in pages: its number in the map.
+//   i/o list[count]: in: 64 n + bit for page pages[n]
+__kernel void to_slots(__global const uint* pages, __global uint* list, const uint count) {
+  const uint n = get_global_id(0);
+  if (n < count) list[n] = PAGE_SLOTS * pages[list[n] / PAGE_SLOTS] + list[n] % PAGE_SLOTS;
+}
+
+INLINE uint chunk_begin(uint count, uint chunk) { return (uint)((ulong)count * chunk / SORT_CHUNKS); }
+
+// One work item a chunk of the new surfels.
+//   out histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, const uint count, const uint cells, __global uint* histogram) {
+  const uint chunk = get_global_id(0);
+  if (chunk >= SORT_CHUNKS) return;
+  for (uint cell = 0; cell < cells; ++cell) histogram[SORT_CHUNKS * cell + chunk] = 0;
+  for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
+}
+
+// One work item a chunk of the new surfels.
+//   i/o histogram: prefix sum before, then where each chunk's share of each cell ends;   out order[count]: new surfels sorted by cell
+__kernel void sort_by_cell(__global const uint* new_cells, const uint count, __global uint* histogram, __global uint* order) {
+  const uint chunk = get_global_id(0);
+  if (chunk >= SORT_CHUNKS) return;
+  for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n)
+    order[histogram[SORT_CHUNKS * new_cells[n] + chunk]++] = n;
+}
+
+// One work item a page.
+//   in  pages[count]: of the window, by cell;   out free_slots[count]
+__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global uint* free_slots) {
+  const uint n = get_global_id(0);
+  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(alive[pages[n]]);
+}
+
+// Pages that a block needs for new surfels in addition to its free slots.
+INLINE uint missing_pages(uint wanted, uint there) { return wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0; }
+
+// One work item a cell, and one more: where its new surfels begin when sorted, and pages that its block needs in addition.
+//   in  histogram: its prefix sum, the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
+//       free_before: prefix sum of count_free's, the total behind it
+//   out cell_begin[cells + 1];  missing[cells]
+__kernel void begin_cells(__global const uint* histogram, __global const uint* cell_pages, __global const uint* free_before,
+                          const uint cells, __global uint* cell_begin, __global uint* missing) {
+  const uint cell = get_global_id(0);
+  if (cell > cells) return;
+  cell_begin[cell] = histogram[SORT_CHUNKS * cell];
+  if (cell == cells) return;
+  const uint wanted = histogram[SORT_CHUNKS * (cell + 1)] - histogram[SORT_CHUNKS * cell],
+             there = free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]];
+  missing[cell] = missing_pages(wanted, there);
+}
+
+// One work item: all of the above for few new surfels, where launches take longer than the work.
+__kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
+                       __global const ulong* alive, __global const uint* cell_pages, const uint cells, __global uint* free_before,
+                       __global uint* cell_begin, __global uint* missing, __global uint* order) {
+  if (get_global_id(0) > 0) return;
+  for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
+  for (uint n = 0; n < count; ++n) ++cell_begin[new_cells[n] + 1];
+  __global uint* next = missing;  // in each cell
+  for (uint cell = 0; cell < cells; ++cell) {
+    next[cell] = cell_begin[cell];
+    cell_begin[cell + 1] += cell_begin[cell];
+  }
+  for (uint n = 0; n < count; ++n) order[next[new_cells[n]]++] = n;
+  uint free_slots = 0;
+  for (uint n = 0; n < page_count; ++n) {
+    free_before[n] = free_slots;
+    free_slots += PAGE_SLOTS - (uint)popcount(alive[pages[n]]);
+  }
+  free_before[page_count] = free_slots;
+  for (uint cell = 0; cell < cells; ++cell)
+    missing[cell] =
+        missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
+}
+
+// One work item a page of the window: its free slots take their share of the cell's new surfels.
+//   in  pages[count], page_cells[count]: first those that begin_cells knows, by cell, then those that have been added for what these do not
+//       take; new_ranks: of such, its number among those of its cell
+//   i/o the map
+__kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
+                         __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
+                         __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
+                         __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
+                         __global uint4* surfels) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1], known = count - new_count;
+  const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
+  uint at = cell_begin[cell] + before - free_before[cell_pages[cell]];
+  ulong taken = 0;
+  for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
+    const uint bit = (uint)lowest_bit(left);
+    surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
+    taken |= 1ul << bit;
+  }
+  if (taken == 0) return;
+  const int3 place = (int3)(cell % window.size_x, cell / window.size_x % window.size_y, cell / window.size_x / window.size_y);
+  page_block[page].xyz = (int3)(window.origin_x, window.origin_y, window.origin_z) + place;
+  alive[page] |= taken;
+  changed[page] |= taken;
+}
+
+// One work item a page of the window.
+//   i/o changed: nothing has, for the next frame
+//   out page_block: frame of the last change;  changes[count]: this frame's;  empty[count]: 1 if nothing is left in it
+__kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
+                           const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = pages[n];
+  changes[n] = changed[page];
+  empty[n] = alive[page] == 0 ? 1 : 0;
+  if (changed[page] != 0) page_block[page].w = (int)frame;
+  changed[page] = 0;
+}
+
+// One work item a slot of a list: its surfel, for the host.
+//   out blocks: block of each, w: 1 if it is alive
+__kernel void gather_surfels(__global const uint* slots, const uint count, __global const ulong* alive, __global const int4* page_block,
+                             __global const uint4* surfels, __global uint4* gathered, __global int4* blocks) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint slot = slots[n];
+  gathered[n] = surfels[slot];
+  blocks[n] = (int4)(page_block[slot / PAGE_SLOTS].xyz, is_alive(alive, slot) ? 1 : 0);
+}
+
+// One work item a slot of a list of pages: the pages one after the other, for the host.
+__kernel void gather_pages(__global const uint* pages, const uint count, __global const uint4* surfels, __global uint4* gathered) {
+  const uint n = get_global_id(0);
+  if (n < PAGE_SLOTS * count) gathered[n] = surfels[PAGE_SLOTS * pages[n / PAGE_SLOTS] + n % PAGE_SLOTS];
+}

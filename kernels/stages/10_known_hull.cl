@@ -1,0 +1,143 @@
+// Known state hull - supplement C: for each path that enters the grid through a face, the state of the last surfel that it met outside.
+//
+// Six images of keys, one after the other: faces i low, i high [size_j][size_k], j low, j high [size_i][size_k], k low, k high
+// [size_j][size_i]. A key is the surfel's distance from the face (bits of a positive float, which sort like the number) with the state in
+// its lowest bit: the smallest key is the nearest surfel, and an unknown one wins a tie. HULL_EMPTY: no surfel.
+
+#define HULL_EMPTY 0xffffffffu
+
+// Where one of six faces starts in a buffer that holds them in order, opposite ones being of the same size.
+INLINE uint face_start(int face, uint face_i, uint face_j, uint face_k) {
+  switch (face) {
+    case FACE_I_LOW:
+      return 0;
+    case FACE_I_HIGH:
+      return face_i;
+    case FACE_J_LOW:
+      return 2 * face_i;
+    case FACE_J_HIGH:
+      return 2 * face_i + face_j;
+    case FACE_K_LOW:
+      return 2 * (face_i + face_j);
+    default:
+      return 2 * (face_i + face_j) + face_k;
+  }
+}
+
+// Number of the first key of a face.
+INLINE uint face_offset(const Grid* g, int face) {
+  return face_start(face, g->size_j * g->size_k, g->size_i * g->size_k, g->size_i * g->size_j);
+}
+
+// Enters a surfel into the cells of an ellipse in a face, those on paths to be walked (and their neighbours).
+//   center, axes: of the ellipse, in the face's coordinates (column, row);  width, height: cells of the face
+//   lines: of the face's first row;  along_k: columns are layers, a bit each, else a number each;  row_lines: from row to row
+INLINE void stamp_face(__global uint* face, int width, int height, float2 center, float2 axes, uint key, __global const uint* lines,
+                       bool along_k, int row_lines) {
+  const float2 half_axes = fmax(axes, 0.5f);
+  if (center.x + half_axes.x < 0.0f || center.x - half_axes.x > (float)(width - 1)) return;
+  const int last_row = min(floor_int(center.y + half_axes.y), height - 1);
+  for (int row = max(ceil_int(center.y - half_axes.y), 0); row <= last_row; ++row) {
+    const float d = ((float)row - center.y) / half_axes.y;
+    const float half_width = half_axes.x * sqrt(fmax(1.0f - d * d, 0.0f));
+    const int last = min(floor_int(center.x + half_width), width - 1);
+    __global const uint* needed = lines + row * row_lines;
+    for (int column = max(ceil_int(center.x - half_width), 0); column <= last; ++column) {
+      if (along_k && needed[column >> 5] == 0) {
+        column |= 31;  // the whole word
+        continue;
+      }
+      if ((along_k ? (needed[column >> 5] >> (column & 31)) & 1 : needed[column]) == 0) continue;
+      atomic_min(&face[row * width + column], key);
+    }
+  }
+}
+
+// A surfel's key in the face that it is beyond along one family of paths; HULL_EMPTY if it is beyond neither.
+//   position, size: along that family;  entering: cosine between normal and paths
+INLINE uint face_key(float position, int size, float entering, float th_d, bool ragged) {
+  const bool below = position < -0.5f;
+  if (!below && position < (float)size - 0.5f) return HULL_EMPTY;
+  const bool known = !ragged && (below ? entering > th_d : entering < -th_d);
+  const float distance = below ? -0.5f - position : position - ((float)size - 0.5f);
+  return (as_uint(distance) & ~1u) | (known ? 1u : 0u);
+}
+
+// Enters a surfel into the faces that it is beyond.
+INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfel* surfel, __global const uint* lines,
+                         __global uint* faces) {
+  const Grid g = *grid;
+  const ViewSurfel s = *surfel;
+  const uint key_i = face_key(s.i, g.size_i, s.n_x, limits->th_d, s.ragged != 0),
+             key_j = face_key(s.j, g.size_j, s.n_y, limits->th_d, s.ragged != 0);
+  const uint key_k = face_key(s.k, g.size_k, s.n_k, limits->th_d, s.ragged != 0);
+  const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
+  const float unknown = limits->hull_unknown_scale;
+  if (key_i != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.i < 0.0f ? FACE_I_LOW : FACE_I_HIGH), g.size_k, g.size_j, (float2)(s.k, s.j),
+               axes.zy * (key_i & 1 ? 1.0f : unknown), key_i, lines + lines_i(&g, 0, 0), true, 2 * g.words_k);
+  if (key_j != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.j < 0.0f ? FACE_J_LOW : FACE_J_HIGH), g.size_k, g.size_i, (float2)(s.k, s.i),
+               axes.zx * (key_j & 1 ? 1.0f : unknown), key_j, lines + lines_j(&g, 0, 0), true, 2 * g.words_k);
+  if (key_k != HULL_EMPTY)
+    stamp_face(faces + face_offset(&g, s.k < 0.0f ? FACE_K_LOW : FACE_K_HIGH), g.size_i, g.size_j, (float2)(s.i, s.j),
+               axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
+}
+
+// One work item LANES slots of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own
+// reach as a margin), enter it.
+//   in  lines: of 5_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
+__kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
+                           __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
+                           __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
+  const uint item = get_global_id(0);
+  if (item >= PAGE_SLOTS / LANES * count) return;
+  const uint page = pages[item / (PAGE_SLOTS / LANES)], first = PAGE_SLOTS * page + LANES * (item % (PAGE_SLOTS / LANES));
+  const uint lanes = lanes_of_page(alive[page], first);
+  if (lanes == 0) return;
+  const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+  const Voxels at = voxels_at(&g, s.position);
+  const int16 reach = convert_int16(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.position.z, g.z_min)) + 2;
+  const int16 near_i = (at.i >= -reach) & (at.i < g.size_i + reach), near_j = (at.j >= -reach) & (at.j < g.size_j + reach);
+  const int16 near_k = (at.k >= -reach) & (at.k < g.size_k + reach);
+  const int16 beyond = (((at.i < 0) | (at.i >= g.size_i)) & near_j & near_k) | (((at.j < 0) | (at.j >= g.size_j)) & near_i & near_k) |
+                       (((at.k < 0) | (at.k >= g.size_k)) & near_i & near_j);
+  for (uint left = lanes & lane_bits(beyond); left != 0; left &= left - 1) {
+    const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + lowest_lane(left));
+    enter_surfel(&g, &limits, &v, lines, faces);
+  }
+}
+
+// Is the state of a cell known? Not if no surfel was met there or beside it.
+INLINE bool hull_cell(__global const uint* face, int width, int height, int column, int row) {
+  const uint key = face[row * width + column];
+  if ((key & 1u) == 0 || key == HULL_EMPTY) return false;
+  return !((column > 0 && face[row * width + column - 1] == HULL_EMPTY) ||
+           (column < width - 1 && face[row * width + column + 1] == HULL_EMPTY) ||
+           (row > 0 && face[(row - 1) * width + column] == HULL_EMPTY) ||
+           (row < height - 1 && face[(row + 1) * width + column] == HULL_EMPTY));
+}
+
+// Number of the first word of a face in the hull's bits: i faces [size_j][words_k], j faces [size_i][words_k], bits along k;
+// k faces [size_j][size_i], a word each.
+INLINE uint hull_word_offset(const Grid* g, int face) {
+  return face_start(face, g->size_j * g->words_k, g->size_i * g->words_k, g->size_i * g->size_j);
+}
+
+// One work item a word of the hull; dimension 1 is the face.
+//   out hull: bits as hull_word_offset says, 1 = known
+__kernel void hull_states(const Grid g, __global const uint* faces, __global ulong* hull) {
+  const int word = get_global_id(0), face = get_global_id(1);
+  __global const uint* image = faces + face_offset(&g, face);
+  if (face >= FACE_K_LOW) {
+    if (word >= g.size_i * g.size_j) return;
+    hull[hull_word_offset(&g, face) + word] = hull_cell(image, g.size_i, g.size_j, word % g.size_i, word / g.size_i) ? 1 : 0;
+    return;
+  }
+  const int rows = face <= FACE_I_HIGH ? g.size_j : g.size_i;
+  if (word >= rows * g.words_k) return;
+  const int row = word / g.words_k, first = word % g.words_k * 64;
+  ulong bits = 0;
+  for (int k = first; k < min(first + 64, g.size_k); ++k) bits |= (ulong)hull_cell(image, g.size_k, rows, k, row) << (k - first);
+  hull[hull_word_offset(&g, face) + word] = bits;
+}

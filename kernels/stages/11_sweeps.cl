@@ -1,0 +1,111 @@
+// Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family.
+//
+// At each voxel, in this order: invalid or exit -> e = 0; K' |= e; enter (and not invalid) -> e = 1. Along i and j one word carries 64
+// paths. events: bit fields [3][EVENT_PLANES] of 9_sign_field; hull: 10_known_hull; lines: 5_recent_views: paths without a bit there are not
+// walked.
+
+INLINE bool is_needed(__global const uint* lines, int word) { return (lines[word] | lines[word + 1]) != 0; }
+
+INLINE ulong step_paths(ulong* e, ulong enter, ulong exit, ulong invalid) {
+  *e &= ~(exit | invalid);
+  const ulong known = *e;
+  *e |= enter & ~invalid;
+  return known;
+}
+
+// The paths of one word of a face through the grid and back: words first, first + stride, ... are `count` voxels of them.
+//   out known: set where a path is known
+void sweep_words(__global const ulong* events, size_t plane, int first, int stride, int count, ulong from_low, ulong from_high,
+                 __global ulong* known, bool overwrite) {
+  __global const ulong* invalid = events + EVENT_INVALID * plane;
+  ulong e = from_low;
+  for (int n = 0, at = first; n < count; ++n, at += stride) {
+    const ulong bits = step_paths(&e, events[EVENT_ENTER_FORWARD * plane + at], events[EVENT_EXIT_FORWARD * plane + at], invalid[at]);
+    known[at] = overwrite ? bits : known[at] | bits;
+  }
+  e = from_high;
+  for (int n = 0, at = first + (count - 1) * stride; n < count; ++n, at -= stride)
+    known[at] |= step_paths(&e, events[EVENT_ENTER_BACKWARD * plane + at], events[EVENT_EXIT_BACKWARD * plane + at], invalid[at]);
+}
+
+// One work item a word (j, w) of the i faces. First of the three: it sets known, the others add to it.
+__kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
+  const int path = get_global_id(0);
+  if (path >= g.size_j * g.words_k || !is_needed(lines, 2 * path)) return;
+  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
+  sweep_words(events, plane, path * g.size_i, 1, g.size_i, hull[hull_word_offset(&g, FACE_I_LOW) + path],
+              hull[hull_word_offset(&g, FACE_I_HIGH) + path], known, true);
+}
+
+// One work item a word (i, w) of the j faces.
+__kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
+  const int path = get_global_id(0);
+  if (path >= g.size_i * g.words_k) return;
+  const int i = path % g.size_i, w = path / g.size_i;
+  if (!is_needed(lines, lines_j(&g, i, w))) return;
+  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
+  sweep_words(events + EVENT_PLANES * plane, plane, word_index(&g, i, 0, w), g.size_i * g.words_k, g.size_j,
+              hull[hull_word_offset(&g, FACE_J_LOW) + i * g.words_k + w], hull[hull_word_offset(&g, FACE_J_HIGH) + i * g.words_k + w],
+              known, false);
+}
+
+// One path, up a word's bits: between events its state is a run.
+INLINE ulong walk_up(bool* e, ulong enter, ulong exit, ulong invalid) {
+  ulong known = 0;
+  int from = 0;
+  for (ulong left = enter | exit | invalid; left != 0; left &= left - 1) {
+    const int k = lowest_bit(left);
+    const ulong bit = 1ul << k;
+    if (*e) known |= bit_run(from, k);
+    if ((exit | invalid) & bit) *e = false;
+    if (*e) known |= bit;
+    if (enter & ~invalid & bit) *e = true;
+    from = k + 1;
+  }
+  if (*e) known |= bit_run(from, 64);
+  return known;
+}
+
+// The same, down.
+INLINE ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
+  ulong known = 0, left = enter | exit | invalid;
+  int to = 64;
+  while (left != 0) {
+    const int k = highest_bit(left);
+    const ulong bit = 1ul << k;
+    if (*e) known |= bit_run(k + 1, to);
+    if ((exit | invalid) & bit) *e = false;
+    if (*e) known |= bit;
+    if (enter & ~invalid & bit) *e = true;
+    to = k;
+    left ^= bit;
+  }
+  if (*e) known |= bit_run(0, to);
+  return known;
+}
+
+// One work item a path (i, j).
+__kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+                      __global ulong* known) {
+  const int path = get_global_id(0);
+  if (path >= g.size_i * g.size_j) return;
+  const int i = path % g.size_i, j = path / g.size_i;
+  if (lines[lines_k(&g, i, j)] == 0) return;
+  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
+  __global const ulong* planes = events + 2 * EVENT_PLANES * plane;
+
+  bool e = hull[hull_word_offset(&g, FACE_K_LOW) + path] != 0;
+  for (int w = 0; w < g.words_k; ++w) {
+    const int at = word_index(&g, i, j, w);
+    known[at] |= valid_layers(&g, w) & walk_up(&e, planes[EVENT_ENTER_FORWARD * plane + at], planes[EVENT_EXIT_FORWARD * plane + at],
+                                               planes[EVENT_INVALID * plane + at]);
+  }
+  e = hull[hull_word_offset(&g, FACE_K_HIGH) + path] != 0;
+  for (int w = g.words_k - 1; w >= 0; --w) {
+    const int at = word_index(&g, i, j, w);
+    known[at] |= valid_layers(&g, w) & walk_down(&e, planes[EVENT_ENTER_BACKWARD * plane + at], planes[EVENT_EXIT_BACKWARD * plane + at],
+                                                 planes[EVENT_INVALID * plane + at]);
+  }
+}

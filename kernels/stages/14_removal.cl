@@ -1,0 +1,10 @@
+// Removal - paper 3.4, eq. (12) - of what 3_visit has decided on.
+
+// One work item a page of the window: slots of removed surfels become free.
+__kernel void remove_surfels(__global const uint* pages, const uint count, __global const ulong* removed, __global ulong* alive,
+                             __global ulong* changed) {
+  const uint n = get_global_id(0);
+  if (n >= count || removed[n] == 0) return;
+  alive[pages[n]] &= ~removed[n];
+  changed[pages[n]] |= removed[n];
+}

@@ -1,0 +1,28 @@
+// Labels and colour - paper 3.5: a surfel where a column of observed voxels ends at a measured surface is occupied, for ever.
+
+// One work item LANES surfels of a page of the window: those that are new, and those that 3_visit has found at a surface.
+//   in  changed: which surfels they are;  depth, column_end: of 1_observed_space
+//       color[height][width]: red | green << 8 | blue << 16, if has_color
+__kernel void label_surfels(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
+                            __global const float* depth, __global const int* column_end, __global const uint* color, const int has_color,
+                            __global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
+                            __global const int4* page_block, __global uint4* surfels) {
+  const uint n = get_global_id(0) / PAGE_ITEMS;
+  if (n >= count) return;
+  const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
+  const uint lanes = lanes_of_page(alive[page] & changed[page], first);
+  if (lanes == 0) return;
+  const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+  const Voxels v = voxels_at(&g, s.position);
+  const int16 unlabelled = inside_grid16(&g, v) & lacks_label(s.attributes, has_color);
+  int16 at;
+  const int16 labelled = at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &at);
+  int pixel[LANES];
+  vstore16(at, 0, pixel);
+  for (uint left = lanes & lane_bits(labelled); left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    uint attributes = surfels[first + m].w | SURFEL_OCCUPIED;
+    if (has_color && (attributes & SURFEL_COLORED) == 0) attributes = (attributes & 0xff000000u) | SURFEL_COLORED | color[pixel[m]];
+    surfels[first + m].w = attributes;
+  }
+}

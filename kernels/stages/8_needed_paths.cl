@@ -1,0 +1,42 @@
+// The paths that the paper's section 3.2 must walk: those near a candidate that the recent views have left open.
+
+// Paths that section 4 must still walk: those through the 27 voxels around a candidate, and their neighbours, which the hull looks at.
+// Three fields, one after the other: i paths [size_j][words_k] and j paths [size_i][words_k], a bit each along k; k paths [size_j][size_i],
+// a 32-bit number each.
+#define LINE_MARGIN 2
+
+INLINE int lines_i(const Grid* g, int j, int w) { return 2 * (j * g->words_k + w); }
+INLINE int lines_j(const Grid* g, int i, int w) { return 2 * ((g->size_j + i) * g->words_k + w); }
+INLINE int lines_k(const Grid* g, int i, int j) { return 2 * (g->size_i + g->size_j) * g->words_k + j * g->size_i + i; }
+
+INLINE void or_word(__global uint* lines, int at, ulong bits) {
+  const uint low = (uint)bits, high = (uint)(bits >> 32);
+  if (low != 0) atomic_or(&lines[at], low);
+  if (high != 0) atomic_or(&lines[at + 1], high);
+}
+
+// One work item a word.
+//   i/o lines: zero before
+__kernel void mark_lines(const Grid g, __global const ulong* candidates, __global uint* lines) {
+  const int word = get_global_id(0);
+  if (word >= g.size_i * g.size_j * g.words_k) return;
+  const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
+  const ulong open = candidates[tile_word_index(&g, i, j, w)];
+  if (open == 0) return;
+  ulong below = 0, here = open, above = 0;  // the bits spread along k, into the words beside as well
+  for (int n = 1; n <= LINE_MARGIN; ++n) {
+    here |= (open << n) | (open >> n);
+    below |= open << (64 - n);
+    above |= open >> (64 - n);
+  }
+  for (int d = -LINE_MARGIN; d <= LINE_MARGIN; ++d) {
+    for (int layer = -1; layer <= 1; ++layer) {
+      const ulong bits = layer < 0 ? below : layer > 0 ? above : here;
+      if (bits == 0 || w + layer < 0 || w + layer >= g.words_k) continue;
+      if (j + d >= 0 && j + d < g.size_j) or_word(lines, lines_i(&g, j + d, w + layer), bits);
+      if (i + d >= 0 && i + d < g.size_i) or_word(lines, lines_j(&g, i + d, w + layer), bits);
+    }
+    for (int e = -LINE_MARGIN; e <= LINE_MARGIN; ++e)
+      if (i + d >= 0 && i + d < g.size_i && j + e >= 0 && j + e < g.size_j) lines[lines_k(&g, i + d, j + e)] = 1;
+  }
+}

@@ -1,0 +1,134 @@
+/// make_synthetic OUT: the demo's sequence, a furnished room seen on a walk around its table, as a folder of images and exact poses.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+
+#include "synthetic/synthetic_room.hpp"
+
+namespace fs = std::filesystem;
+namespace replay = frontier_surfels::replay;
+using frontier_surfels::FileError;
+
+namespace {
+
+struct Options {
+  std::string output;
+  int frames = 60;
+  int width = 640;
+  int height = 480;
+  double focal = 0;  ///< [pixel]; 0: of a Kinect's field of view
+  replay::CameraPath path = replay::CameraPath::kOrbit;
+  replay::SensorModel sensor;
+};
+
+/// "640x480" into its numbers; CLI11's way to say what is wrong, or nothing.
+std::string read_size(const std::string& text, int& width, int& height) {
+  char rest = 0;
+  const bool well_formed = std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) == 2;
+  const bool fits = well_formed && std::min(width, height) >= 8 && std::max(width, height) <= 8192;
+  return fits ? "" : "must be WIDTHxHEIGHT with 8 to 8192 pixels each, such as 640x480, not '" + text + "'";
+}
+
+std::ofstream open_text(const fs::path& path) {
+  std::ofstream file(path);
+  file.precision(17);  // doubles come back bit for bit
+  if (!file) throw FileError(path.string() + " cannot be written: check that the folder is yours and has space.");
+  return file;
+}
+
+void close_text(std::ofstream& file, const fs::path& path) {
+  file.close();
+  if (!file) throw FileError(path.string() + " cannot be written: check that there is space.");
+}
+
+void write_image(const fs::path& path, const cv::Mat& image) {
+  bool written = false;
+  try {
+    written = cv::imwrite(path.string(), image);
+  } catch (const cv::Exception&) {
+  }
+  if (!written) throw FileError(path.string() + " cannot be written: check that the folder is yours and has space.");
+}
+
+void write_camera(const fs::path& path, const frontier_surfels::Intrinsics& camera) {
+  std::ofstream file = open_text(path);
+  file << camera.fx << ' ' << camera.fy << ' ' << camera.cx << ' ' << camera.cy << ' ' << camera.width << ' ' << camera.height << '\n';
+  close_text(file, path);
+}
+
+void write_pose(std::ofstream& file, const replay::RecordedFrame& frame) {
+  const Eigen::Vector3d translation = frame.T_world_camera.translation();
+  const Eigen::Quaterniond rotation(frame.T_world_camera.rotation());
+  file << frame.stamp << ' ' << translation.x() << ' ' << translation.y() << ' ' << translation.z() << ' ' << rotation.x() << ' '
+       << rotation.y() << ' ' << rotation.z() << ' ' << rotation.w() << '\n';
+}
+
+void write_sequence(const Options& options) {
+  auto camera = replay::synthetic_camera(options.width, options.height);
+  if (options.focal > 0) camera.fx = camera.fy = options.focal;
+  const fs::path folder = options.output;
+  if (fs::exists(folder / "depth") && !fs::is_empty(folder / "depth")) {
+    throw FileError((folder / "depth").string() + " already has images: choose another folder, or remove it.");
+  }
+  fs::create_directories(folder / "depth");
+  fs::create_directories(folder / "color");
+  write_camera(folder / "camera.txt", camera);
+  std::ofstream poses = open_text(folder / "poses.txt");
+  poses << "# timestamp tx ty tz qx qy qz qw (camera to world, optical frame)\n";
+
+  const replay::Room room;
+  for (int index = 0; index < options.frames; ++index) {
+    const replay::RecordedFrame frame = room.render(index, options.frames, camera, options.sensor, options.path);
+    char name[32];
+    std::snprintf(name, sizeof(name), "%06d", index);
+    write_image(folder / "depth" / (std::string(name) + ".png"), frame.depth);
+    write_image(folder / "color" / (std::string(name) + ".jpg"), frame.color);
+    write_pose(poses, frame);
+  }
+  close_text(poses, folder / "poses.txt");
+  std::printf("%d frames are in %s.\n", options.frames, options.output.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.");
+  app.failure_message(CLI::FailureMessage::help);
+  app.option_defaults()->always_capture_default();
+  app.add_option("OUT", options.output, "the folder to be written")->required();
+  app.add_option("--frames", options.frames, "so many from the path's beginning to its end")->check(CLI::Range(1, 999999));
+  const std::map<std::string, replay::CameraPath> paths = {{"orbit", replay::CameraPath::kOrbit},
+                                                           {"turn", replay::CameraPath::kTurn},
+                                                           {"walk", replay::CameraPath::kWalk},
+                                                           {"close", replay::CameraPath::kClose}};
+  app.add_option("--path", options.path,
+                 "of the camera: around the table, a turn on the spot, a walk into the corridor, or close to things")
+      ->transform(CLI::CheckedTransformer(paths))
+      ->default_str("orbit");
+  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect's field of view")->check(CLI::Range(0.0, 1e5));
+  app.add_flag("--noise", options.sensor.noise, "Kinect-like: a deviation of 1.425e-3 z^2, in steps of disparity");
+  app.add_option("--dropouts", options.sensor.dropouts, "share of pixels lost in blobs; also at edges and grazing angles")
+      ->check(CLI::Range(0.0, 0.9));
+  app.add_option("--seed", options.sensor.seed, "of noise and dropouts");
+  std::string size = "640x480";
+  app.add_option("--size", size, "of the images")->check([&](const std::string& text) {
+    return read_size(text, options.width, options.height);
+  });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    write_sequence(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

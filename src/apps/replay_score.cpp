@@ -1,0 +1,209 @@
+/// replay_score: maps a recording, scores the map, and writes a report.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <optional>
+
+#include "apps/command.hpp"
+#include "apps/interrupt.hpp"
+#include "frontier_surfels/ply.hpp"
+#include "replay/live_replay.hpp"
+#include "replay/report_page.hpp"
+#include "replay/run.hpp"
+#include "replay/summary.hpp"
+#include "replay/sweep.hpp"
+
+namespace frontier_surfels::replay {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The command line, checked.
+struct Options {
+  Recording recording;
+  std::string report;  ///< folder
+  Config config;
+  double octomap_resolution = 0.01;  ///< [m]; 0: off
+  bool exact = true;
+  std::optional<Sweep> sweep;
+  std::optional<LiveOptions> live;
+};
+
+/// The command line as text; what needs the configuration is read from it afterwards.
+struct RawOptions {
+  std::string config_file;
+  std::vector<std::string> settings;
+  std::optional<int> threads;
+  std::string sweep;
+  std::string mapper;
+  bool no_exact = false;
+  bool live = false;
+};
+
+void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
+  SourceOptions& source = options.recording.options;
+  app.add_option("INPUT", options.recording.path, "a bag, or a folder (TUM RGB-D layout, or depth/ + poses.txt + camera.txt)")->required();
+  app.add_option("--report", options.report, "folder for the report; made if it is missing")->required()->type_name("DIR");
+  app.add_option("--config", raw.config_file, "parameters of the mapper")->type_name("FILE.yaml");
+  app.add_option("--set", raw.settings, "one parameter of the mapper; can be given again and again")
+      ->type_name("key=value")
+      ->allow_extra_args(false);
+  app.add_option("--first", source.first, "index of the first frame")->type_name("N")->check(CLI::NonNegativeNumber);
+  app.add_option("--last", source.last, "index of the last frame; -1: the end")->type_name("N")->check(CLI::Range(-1, INT32_MAX));
+  app.add_option("--stride", source.stride, "every so many frames")->type_name("N")->check(CLI::PositiveNumber);
+  app.add_option("--depth-topic", source.depth_topic, "bags: topic of the depth images")->type_name("T");
+  app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's info")->type_name("T");
+  app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
+  app.add_option("--world-frame", source.world_frame, "bags: tf frame of the map")->type_name("F");
+  app.add_option("--octomap-resolution", options.octomap_resolution, "voxel of the OctoMap beside [m], 0.01 unless given; 0: none")
+      ->type_name("M");
+  app.add_flag("--no-exact", raw.no_exact, "leave the exact test out");
+  app.add_option("--threads", raw.threads, "threads of the mapper and the scorers; 0: all")->type_name("N")->check(CLI::NonNegativeNumber);
+  app.add_option("--sweep", raw.sweep, "repeat the run over N values of a parameter")->type_name("PARAM=LO:HI:N");
+  app.add_flag("--live", raw.live, "bags: publish it into a mapper node that runs already, and score the map that it publishes");
+  app.add_option("--mapper", raw.mapper, "name of that node, mapper unless given")->type_name("NAME")->needs("--live");
+  app.add_flag_callback(
+      "--parameters",
+      [] {
+        std::cout << parameter_table();
+        throw CLI::Success();
+      },
+      "print all parameters of the mapper");
+}
+
+/// @throws CLI::ValidationError with every fault of the settings and the configuration
+void read_config(const RawOptions& raw, Config& config) {
+  if (!raw.config_file.empty()) config = load_config(raw.config_file);
+  std::string problems;
+  for (const std::string& setting : raw.settings) {
+    const auto equals = setting.find('=');
+    try {
+      if (equals == std::string::npos) throw Error("--set '" + setting + "' is not of the form key=value.");
+      set_field(config, setting.substr(0, equals), setting.substr(equals + 1));
+    } catch (const Error& error) {
+      problems += std::string(error.what()) + "\n";
+    }
+  }
+  if (raw.threads) config.threads = *raw.threads;
+  for (const std::string& problem : config.problems()) problems += problem + "\n";
+  if (!problems.empty()) throw CLI::ValidationError("", problems);
+}
+
+/// @throws CLI::ValidationError for what a running mapper has been told already
+LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& ros_arguments) {
+  if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
+    throw CLI::ValidationError("--live",
+                               "the running mapper's own parameters count: set them where it is started, and leave --config, --set, "
+                               "--threads and --sweep out");
+  }
+  LiveOptions live;
+  if (!raw.mapper.empty()) live.mapper = raw.mapper;
+  live.ros_arguments = ros_arguments;
+  return live;
+}
+
+/// @throws CLI::Error (also for help, with exit code 0), Error
+Options parse(int argc, char** argv) {
+  Options options;
+  RawOptions raw;
+  std::vector<std::string> arguments(std::make_reverse_iterator(argv + argc), std::make_reverse_iterator(argv + 1));  // as CLI wants them
+  const auto is_ours = [](const std::string& argument) { return argument.find(":=") == std::string::npos; };
+  const auto ros = std::stable_partition(arguments.begin(), arguments.end(), is_ours);  // roslaunch adds some of its own
+  const std::vector<std::string> ros_arguments(ros, arguments.end());
+  arguments.erase(ros, arguments.end());
+  CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
+               "replay_score");
+  declare_options(app, options, raw);
+  read_arguments(app, [&] {
+    app.parse(arguments);
+    const int last = options.recording.options.last;
+    if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
+    // The upper bound catches millimetres, the lower one more voxels than fit any memory; NaN fails both.
+    const double resolution = options.octomap_resolution;
+    if (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10))
+      throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
+    read_config(raw, options.config);
+    options.exact = !raw.no_exact;
+    if (raw.live) options.live = live_options(raw, ros_arguments);
+    if (!raw.sweep.empty()) try {
+        options.sweep = parse_sweep(raw.sweep, options.config);
+      } catch (const Error& error) {
+        throw CLI::ValidationError("", error.what());
+      }
+  });
+  return options;
+}
+
+/// Makes the folder, proves that it can be written before hours are spent, and removes what an earlier run may have left there.
+void prepare_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const fs::path probe = folder / "summary.json";
+  if (!fs::is_directory(folder) || !std::ofstream(probe)) {
+    throw FileError("The report's folder '" + folder.string() + "' cannot be made or written: choose another with --report.");
+  }
+  for (const char* name :
+       {"summary.json", "frames.csv", "trajectory.txt", "surfels.ply", "octomap.ply", "verdicts.bin", "sweep.json", "report.html"}) {
+    fs::remove(folder / name, error);
+  }
+}
+
+/// What is known before scoring: a second Ctrl-C leaves at least that.
+void write_map(const fs::path& folder, const Run& run) {
+  write_ply(folder / "surfels.ply", run.surfels);
+  write_file(folder / "frames.csv", frames_csv(run.frames));
+  write_file(folder / "trajectory.txt", trajectory_text(run.frames));
+}
+
+void write_scores(const fs::path& folder, const Yardsticks& yardsticks, const Scores& scores, const nlohmann::ordered_json& summary) {
+  if (scores.octomap) write_ply(folder / "octomap.ply", yardsticks.octomap_boundary());
+  if (scores.exact)
+    write_file(folder / "verdicts.bin", std::string(reinterpret_cast<const char*>(scores.verdicts.data()), scores.verdicts.size()));
+  write_file(folder / "summary.json", summary.dump(2) + "\n");
+}
+
+/// Many frames are often passed over for one and the same reason, so the first few say it.
+void tell_skipped(const std::vector<std::string>& skipped) {
+  constexpr std::size_t kShown = 5;
+  for (std::size_t i = 0; i < std::min(skipped.size(), kShown); ++i) std::cerr << "Skipped a frame: " << skipped[i] << "\n";
+  if (skipped.size() > kShown) std::cerr << "... and " << skipped.size() - kShown << " more.\n";
+}
+
+void replay_and_score(const Options& options) {
+  const fs::path folder = options.report;
+  catch_first_interrupt();
+  auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
+  const Config config = live ? live->config() : options.config;
+  prepare_folder(folder);
+
+  Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
+  const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
+  live.reset();  // scoring takes its time: the mapper must not send to somebody who does not listen
+  tell_skipped(run.skipped);
+  if (run.stopped) std::cerr << "Stopped after " << run.frames.size() << " frames: these are scored and written. Once more ends at once.\n";
+  write_map(folder, run);
+
+  const Scores scores = score(run.surfels, yardsticks, config.threads);
+  const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
+  write_scores(folder, yardsticks, scores, summary);
+  std::cout << result_table(summary) << std::flush;
+
+  if (options.sweep && !run.stopped) {
+    const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
+    write_file(folder / "sweep.json", sweep.dump(2) + "\n");
+  }
+  make_report_page(folder);
+  std::cout << "report      " << (folder / "report.html").string() << "\n";
+}
+
+}  // namespace
+}  // namespace frontier_surfels::replay
+
+int main(int argc, char** argv) {
+  using namespace frontier_surfels::replay;
+  return run_command("replay_score", "leave the OctoMap out (--octomap-resolution 0) or replay fewer frames (--last, --stride).",
+                     [&] { replay_and_score(parse(argc, argv)); });
+}

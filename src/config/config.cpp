@@ -1,0 +1,107 @@
+#include "frontier_surfels/config.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <locale>
+#include <numeric>
+#include <sstream>
+#include <type_traits>
+
+#include "config/config_text.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+template <typename T>
+constexpr bool kIsNumber = std::is_same_v<T, int> || std::is_same_v<T, double>;
+
+std::string range_text(const FieldInfo& info) { return to_text(info.lowest) + " to " + to_text(info.highest); }
+
+std::string with_unit(const std::string& value, const FieldInfo& info) { return *info.unit ? value + " " + info.unit : value; }
+
+/// Levenshtein's distance: how many letters must be added, dropped or replaced to make `b` of `a`.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string to_text(double value) {
+  if (std::isnan(value)) return ".nan";
+  if (std::isinf(value)) return value > 0 ? ".inf" : "-.inf";
+  using Digits = std::numeric_limits<double>;
+  for (int digits = Digits::digits10;; ++digits) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text.precision(digits);
+    text << value;
+    std::istringstream back(text.str());
+    back.imbue(std::locale::classic());
+    double read = 0;
+    if ((back >> read && read == value) || digits == Digits::max_digits10) return text.str();
+  }
+}
+
+std::string suggestion(const std::string& name, const std::vector<std::string>& more) {
+  std::vector<std::string> names = more;
+  const Config defaults;
+  for_each_field(defaults, [&](const FieldInfo& info, const auto&) { names.push_back(info.name); });
+  std::string nearest;
+  std::size_t smallest = 2 + name.size() / 4;  // further away is another word
+  for (const std::string& candidate : names) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance < smallest) {
+      smallest = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest.empty() ? "; README.md lists all parameters." : "; did you mean '" + nearest + "'?";
+}
+
+std::vector<std::string> Config::problems() const {
+  std::vector<std::string> faults;
+  for_each_field(*this, [&](const FieldInfo& info, const auto& value) {
+    if constexpr (kIsNumber<std::decay_t<decltype(value)>>) {
+      if (value >= info.lowest && value <= info.highest) return;  // false for NaN
+      faults.push_back(std::string(info.name) + " is " + with_unit(to_text(value), info) + ": it must be from " +
+                       with_unit(range_text(info), info) + ".");
+    }
+  });
+  if (z_max <= z_min) {
+    faults.push_back("z_max is " + to_text(z_max) + " m, but z_min is " + to_text(z_min) + " m: z_max must be larger.");
+  }
+  if (!map_folder.empty() && eviction_radius < 3 * z_max) {
+    faults.push_back("eviction_radius is " + to_text(eviction_radius) + " m: it must be at least three times z_max, which is " +
+                     to_text(z_max) + " m.");
+  }
+  if (device_type != "any" && device_type != "cpu" && device_type != "gpu" && device_type != "accelerator") {
+    faults.push_back("device_type is '" + device_type + "': it must be any, cpu, gpu or accelerator.");
+  }
+  return faults;
+}
+
+std::string parameter_table() {
+  std::string table = "| parameter | default | unit | range | meaning |\n|---|---|---|---|---|\n";
+  const Config defaults;
+  for_each_field(defaults, [&](const FieldInfo& info, const auto& value) {
+    using Field = std::decay_t<decltype(value)>;
+    std::string shown = to_text(value);
+    if (shown.empty()) shown = "\"\"";
+    const std::string range = kIsNumber<Field> ? range_text(info) : "";
+    table += std::string("| `") + info.name + "` | " + shown + " | " + info.unit + " | " + range + " | " + info.meaning + " |\n";
+  });
+  return table;
+}
+
+}  // namespace frontier_surfels

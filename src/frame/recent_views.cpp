@@ -1,0 +1,191 @@
+#include "frame/recent_views.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace frontier_surfels {
+namespace {
+
+/// Rounded down: what lies between is not claimed to have been seen. z_max itself may be one step more than there are.
+cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
+
+/// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
+std::vector<float> find_block_depths(const WorkingImage& image) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
+  const int columns = (width + VIEW_BLOCK - 1) / VIEW_BLOCK, rows = (height + VIEW_BLOCK - 1) / VIEW_BLOCK;
+  std::vector<float> blocks(static_cast<std::size_t>(columns) * rows, 0.0F), deepest(columns * VIEW_BLOCK);
+  for (int row = 0; row < rows; ++row) {
+    std::fill(deepest.begin(), deepest.end(), 0.0F);
+    for (int t = row * VIEW_BLOCK; t < std::min((row + 1) * VIEW_BLOCK, height); ++t) {
+      const float* depth = &image.depth[static_cast<std::size_t>(t) * width];
+      for (int s = 0; s < width; ++s) deepest[s] = std::max(deepest[s], std::abs(depth[s]));
+    }
+    for (int column = 0; column < columns; ++column)
+      blocks[row * columns + column] = *std::max_element(&deepest[column * VIEW_BLOCK], &deepest[column * VIEW_BLOCK] + VIEW_BLOCK);
+  }
+  return blocks;
+}
+
+constexpr int kPatch = PATCH_COLUMNS * PATCH_ROWS;
+
+int patches(int pixels, int side) { return (pixels + side - 1) / side; }
+
+/// A view's depths as the kernels read them: patch by patch, in steps, without the signs. What lies beyond the image's edges is 0.
+std::vector<cl_ushort> by_patches(const WorkingImage& image, float per_step) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS);
+  std::vector<cl_ushort> depths(static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch, 0);
+  for (int t = 0; t < height; ++t) {
+    const float* from = &image.depth[static_cast<std::size_t>(t) * width];
+    cl_ushort* to = &depths[static_cast<std::size_t>(t / PATCH_ROWS) * columns * kPatch + t % PATCH_ROWS * PATCH_COLUMNS];
+    int s = 0;
+    for (; s + PATCH_COLUMNS <= width; s += PATCH_COLUMNS, to += kPatch)
+      for (int n = 0; n < PATCH_COLUMNS; ++n) to[n] = to_steps(from[s + n], per_step);
+    for (int n = 0; s + n < width; ++n) to[n] = to_steps(from[s + n], per_step);
+  }
+  return depths;
+}
+
+Transform to_transform(const Eigen::Matrix<double, 3, 4>& matrix) {
+  const Eigen::Matrix<float, 3, 4> m = matrix.cast<float>();
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2), m(0, 3), m(1, 3), m(2, 3)};
+}
+
+/// Camera to image; half a pixel is added, so that what is rounded down is the nearest pixel.
+Eigen::Matrix3d projection(const Intrinsics& camera) {
+  Eigen::Matrix3d K;
+  K << camera.fx, 0, camera.cx + 0.5, 0, camera.fy, camera.cy + 0.5, 0, 0, 1;
+  return K;
+}
+
+/// Puts a view into its lane of a group.
+void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, std::uint32_t first_pixel, float* lane) {
+  const Eigen::Matrix3d R = T_view_camera.linear();
+  const Eigen::Vector3d t = T_view_camera.translation();
+  const double fields[VIEW_LANE_FIELDS - 1] = {R(0, 0),
+                                               R(0, 1),
+                                               R(0, 2),
+                                               R(1, 0),
+                                               R(1, 1),
+                                               R(1, 2),
+                                               R(2, 0),
+                                               R(2, 1),
+                                               R(2, 2),
+                                               t.x(),
+                                               t.y(),
+                                               t.z(),
+                                               camera.fx,
+                                               camera.fy,
+                                               camera.cx,
+                                               camera.cy,
+                                               static_cast<double>(camera.width),
+                                               static_cast<double>(camera.height)};
+  for (int n = 0; n < VIEW_LANE_FIELDS - 1; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
+  std::memcpy(&lane[(VIEW_LANE_FIELDS - 1) * LANES], &first_pixel, sizeof(first_pixel));
+}
+
+/// The kept views in an order in which each is far from those before it: what is still unknown after a few is unknown to most, and what is
+/// known has been found. Multiples of the golden section are spread so.
+std::vector<std::size_t> spread(std::size_t count) {
+  constexpr double kGolden = 0.6180339887498949;
+  std::vector<std::size_t> order;
+  std::vector<bool> taken(count, false);
+  for (std::size_t n = 0; n < count; ++n) {
+    std::size_t at = static_cast<std::size_t>(std::fmod(n * kGolden, 1.0) * count);
+    while (taken[at]) at = (at + 1) % count;
+    taken[at] = true;
+    order.push_back(at);
+  }
+  return order;
+}
+
+}  // namespace
+
+double depth_step_for(double z_max) { return std::exp2(std::ceil(std::log2(z_max / 65536))); }
+
+Transform to_transform(const Eigen::Isometry3d& T) { return to_transform(Eigen::Matrix<double, 3, 4>(T.matrix().topRows<3>())); }
+
+RecentViews::RecentViews(Commands& commands, const Config& config)
+    : config_(config),
+      depth_step_(depth_step_for(config.z_max)),
+      complete_(config.recent_views > 0),
+      views_(commands),
+      view_lanes_(commands),
+      depths_(commands) {}
+
+void RecentViews::clear(bool map_is_empty) {
+  kept_.clear();
+  complete_ = map_is_empty && config_.recent_views > 0;
+}
+
+void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
+  const auto per_step = static_cast<float>(1 / depth_step_);
+  std::vector<cl_ushort> depths = by_patches(image, per_step);
+  for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
+  // The patches of the next room must not lie across lines of the cache; and pixels are read two at a time.
+  depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
+  if (depths.size() > room_size_) {
+    const double pixels = static_cast<double>(config_.recent_views + 1) * static_cast<double>(depths.size());
+    if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
+      throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
+                     " billion pixels, more than 2; raise decimation or lower recent_views.");
+    // A larger image than ever before: the kept ones are few and soon replaced.
+    clear(kept_.empty() && complete_);
+    depths_.allocate((config_.recent_views + 1) * depths.size());
+    room_size_ = depths.size();
+  }
+  std::vector<bool> taken(config_.recent_views + 1, false);
+  for (const Kept& kept : kept_) taken[kept.room] = true;
+  const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
+  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
+  depths_.send(std::move(depths), room * room_size_);
+}
+
+View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
+  View view = {};
+  view.to_image = to_transform(Eigen::Matrix<double, 3, 4>(projection(kept.intrinsics) * T_view_camera.matrix().topRows<3>()));
+  view.width = kept.intrinsics.width;
+  view.height = kept.intrinsics.height;
+  view.first_pixel = static_cast<std::uint32_t>(kept.room * room_size_);
+  view.depth_step = static_cast<float>(depth_step_);
+  return view;
+}
+
+View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d::Identity()); }
+
+int RecentViews::prepare() {
+  std::vector<View> views;
+  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * LANES, 0.0F);
+  for (const std::size_t number : spread(kept_.size())) {
+    const Kept& kept = kept_[number];
+    const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
+    const std::size_t n = views.size();
+    views.push_back(to_view(kept, T_view_camera));
+    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
+  }
+  views_.send(std::move(views));
+  view_lanes_.send(std::move(lanes));
+  return static_cast<int>(kept_.size());
+}
+
+bool RecentViews::adds_something() const {
+  const double cos_angle = std::cos(config_.recent_view_angle * M_PI / 180);
+  return std::none_of(kept_.begin(), kept_.end(), [&](const Kept& kept) {
+    const Eigen::Isometry3d motion = kept.T_world_camera.inverse() * current_.T_world_camera;
+    const double cos_turn = (motion.linear().trace() - 1) / 2;
+    return motion.translation().norm() < config_.recent_view_distance && cos_turn > cos_angle;
+  });
+}
+
+bool RecentViews::keep_current() {
+  if (config_.recent_views == 0 || !adds_something()) return false;
+  if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
+    kept_.pop_back();
+    complete_ = false;
+  }
+  kept_.push_front(current_);
+  return true;
+}
+
+}  // namespace frontier_surfels

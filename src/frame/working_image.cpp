@@ -1,0 +1,124 @@
+#include "frame/working_image.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+namespace frontier_surfels {
+namespace {
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+void check_depth(const DepthImage& image, const Config& config) {
+  const std::size_t pixel = image.encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4;
+  if (image.width < config.decimation || image.height < config.decimation)
+    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
+                   std::to_string(config.decimation) + "; lower decimation.");
+  constexpr int kLargest = 16384;  // the cuboid's tables have 16 bits
+  if (image.width > kLargest || image.height > kLargest)
+    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
+                   size_text(kLargest, kLargest) + ".");
+  if (image.data == nullptr) throw BadFrame("The depth image has no data.");
+  if (image.step < image.width * pixel)
+    throw BadFrame("The depth image's rows of " + std::to_string(image.step) + " bytes are shorter than its " +
+                   std::to_string(image.width) + " pixels.");
+}
+
+void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
+  constexpr double kMost = 1e6, kLeast = 1e-3;  // [pixel]; beyond, floats overflow
+  if (!(k.fx >= kLeast && k.fy >= kLeast && std::isfinite(k.fx) && std::isfinite(k.fy)))
+    throw BadFrame("The focal lengths " + std::to_string(k.fx) + ", " + std::to_string(k.fy) +
+                   " must be positive: is the camera calibrated, and its camera_info published?");
+  if (!(std::abs(k.cx) <= kMost && std::abs(k.cy) <= kMost))
+    throw BadFrame("The principal point " + std::to_string(k.cx) + ", " + std::to_string(k.cy) +
+                   " of the camera is not a number, or nowhere near the image: is its camera_info right?");
+  if (k.width != image.width || k.height != image.height)
+    throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +
+                   size_text(image.width, image.height) + ".");
+}
+
+void check_pose(const Eigen::Isometry3d& T_world_camera) {
+  if (!T_world_camera.matrix().allFinite()) throw BadFrame("The camera's pose is missing or not finite.");
+  const Eigen::Matrix3d R = T_world_camera.linear();
+  constexpr double kTolerance = 1e-3;
+  if (!(R.transpose() * R).isIdentity(kTolerance) || R.determinant() < 0)
+    throw BadFrame("The camera's orientation is not a rotation: normalise its quaternion.");
+  if (T_world_camera.translation().cwiseAbs().maxCoeff() > 1e5)
+    throw BadFrame("The camera is more than 100 km from the world's origin, where a float no longer resolves a voxel; move the origin.");
+}
+
+void check_color(const ColorImage& color, const DepthImage& depth) {
+  if (color.width != depth.width || color.height != depth.height)
+    throw BadFrame("The colour image of " + size_text(color.width, color.height) + " pixels is not registered to the depth image of " +
+                   size_text(depth.width, depth.height) + ".");
+  if (color.data == nullptr || (color.channels != 3 && color.channels != 4) ||
+      color.step < static_cast<std::size_t>(color.width) * color.channels)
+    throw BadFrame("The colour image must have 3 or 4 bytes a pixel and rows no shorter than that.");
+}
+
+float to_metres(std::uint16_t millimetres, bool swap_bytes) {
+  return static_cast<float>(swap_bytes ? __builtin_bswap16(millimetres) : millimetres) / 1000.0F;
+}
+
+float to_metres(std::uint32_t bits, bool swap_bytes) {
+  if (swap_bytes) bits = __builtin_bswap32(bits);
+  float metres;
+  std::memcpy(&metres, &bits, sizeof(metres));
+  return metres;
+}
+
+/// What a depth says: > 0 a surface, < 0 nothing up to its magnitude, 0 no measurement.
+float interpret(float d, const Config& config) {
+  const float z_max = static_cast<float>(config.z_max);
+  if (std::isnan(d) || d < static_cast<float>(config.z_min)) return 0;
+  if (d <= z_max) return d;
+  return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
+}
+
+/// Every step-th pixel of every step-th row. @tparam Pixel  as the image has them
+template <typename Pixel>
+std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
+  std::vector<float> depth;
+  depth.reserve(static_cast<std::size_t>(width) * height);
+  for (int t = 0; t < height; ++t) {
+    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * config.decimation * image.step;
+    for (int s = 0; s < width; ++s, row += config.decimation * sizeof(Pixel)) {
+      Pixel pixel;
+      std::memcpy(&pixel, row, sizeof(pixel));
+      depth.push_back(interpret(to_metres(pixel, image.swap_bytes), config));
+    }
+  }
+  return depth;
+}
+
+std::vector<std::uint32_t> read_color(const ColorImage& image, int width, int height, int step) {
+  const int red = image.order == ColorImage::Order::kRgb ? 0 : 2;
+  std::vector<std::uint32_t> color;
+  color.reserve(static_cast<std::size_t>(width) * height);
+  for (int t = 0; t < height; ++t) {
+    const std::uint8_t* pixel = image.data + t * step * image.step;
+    for (int s = 0; s < width; ++s, pixel += step * image.channels) color.push_back(pixel[red] | pixel[1] << 8 | pixel[2 - red] << 16);
+  }
+  return color;
+}
+
+}  // namespace
+
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
+  check_depth(frame.depth, config);
+  check_intrinsics(frame.intrinsics, frame.depth);
+  check_pose(frame.T_world_camera);
+  if (frame.color) check_color(*frame.color, frame.depth);
+
+  const int step = config.decimation, width = frame.depth.width / step, height = frame.depth.height / step;
+  const Intrinsics& full = frame.intrinsics;
+  WorkingImage image;
+  image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
+  image.depth = frame.depth.encoding == DepthImage::Encoding::kMillimetresU16
+                    ? read_depth<std::uint16_t>(frame.depth, width, height, config)
+                    : read_depth<std::uint32_t>(frame.depth, width, height, config);
+  if (frame.color) image.color = read_color(*frame.color, width, height, step);
+  return image;
+}
+
+}  // namespace frontier_surfels

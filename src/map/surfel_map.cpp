@@ -1,0 +1,297 @@
+#include "map/surfel_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "common/shared.h"
+#include "map/bits.hpp"
+#include "map/surfel_packing.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kGathered = 1 << 14;   // pages brought to the host at a time
+constexpr std::size_t kSpare = 16;           // one page of so many is allocated ahead; on a CPU as many as there are, which cost
+                                             // nothing, or a page of the system, until they are touched
+constexpr std::size_t kFewToSort = 1 << 14;  // new surfels; on a CPU, where launches take longer
+
+BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
+
+/// Voxel at the far end [m], and some more.
+double coarsest_voxel(const Grid& grid) { return 1.2 * grid.z_max / grid.f; }
+
+/// Radius of the largest surfels that a view creates [m].
+double largest_created(const Grid& grid) { return std::sqrt(3.0) / 2 * coarsest_voxel(grid); }
+
+}  // namespace
+
+SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
+    : commands_(commands),
+      lists_(lists),
+      block_size_(block_size_for(config.z_max)),
+      largest_radius_(0),
+      thickness_(config.thickness),
+      surfels_(commands),
+      alive_(commands),
+      changed_(commands),
+      page_block_(commands),
+      pages_list_(commands),
+      page_cells_list_(commands),
+      cell_pages_list_(commands),
+      new_ranks_list_(commands),
+      histogram_(commands),
+      cell_begin_(commands),
+      free_before_(commands),
+      missing_(commands),
+      order_(commands),
+      changes_(commands),
+      empty_(commands),
+      changed_slots_(commands),
+      gathered_(commands),
+      gathered_blocks_(commands) {
+  grow(1024);
+}
+
+/// Pages without surfels have neither bits in `alive` nor in `changed`, those that are not in use either.
+void SurfelMap::grow(std::size_t pages) {
+  const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
+  const auto grow_marks = [&](DeviceArray<cl_ulong>& marks) {
+    const std::size_t before = marks.size();
+    marks.grow(pages, kept, spare);
+    if (marks.size() > before) marks.fill("creation", 0, marks.size() - kept, kept);
+  };
+  surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
+  grow_marks(alive_);
+  grow_marks(changed_);
+  page_block_.grow(pages, kept, spare);
+}
+
+/// How far from the grid a surfel may be that matters to it [m].
+double SurfelMap::window_margin(const Grid& grid) const {
+  const double voxel = coarsest_voxel(grid), largest = std::max(largest_radius_, largest_created(grid));
+  const double slope =
+      std::max({grid.center_i, grid.size_i - grid.center_i}) / grid.fx + std::max({grid.center_j, grid.size_j - grid.center_j}) / grid.fy;
+  return (std::max(2 * largest, thickness_ * voxel) + 2 * voxel) * (1 + slope);
+}
+
+double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const {
+  const double margin = window_margin(grid);
+  const MapWindow window(grid, T_world_camera, block_size_, margin, {});  // refuses what is absurd
+  return grid_reach(grid) + margin + 2 * block_size_;                     // whole blocks; to the centre; and half a block of motion
+}
+
+void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
+  const double margin = window_margin(grid);
+  largest_radius_ = std::max(largest_radius_, largest_created(grid));
+  window_ = MapWindow(grid, T_world_camera, block_size_, margin, {largest_radius_, thickness_});
+  listed_cells_.clear();
+  for (int cell = 0; cell < window_.cells(); ++cell) {
+    const BlockKey block = window_.block(cell);
+    listed_cells_.push_back(index_.find(block) != nullptr && window_.meets_grid(block));
+  }
+  list_window();
+}
+
+/// The window's pages by cell.
+void SurfelMap::list_window() {
+  std::vector<Page> pages;
+  std::vector<cl_uint> page_cells, cell_pages = {0};
+  for (int cell = 0; cell < window_.cells(); ++cell) {
+    if (listed_cells_[cell]) {
+      const BlockIndex::Pages& own = *index_.find(window_.block(cell));
+      pages.insert(pages.end(), own.begin(), own.end());
+      page_cells.resize(pages.size(), static_cast<cl_uint>(cell));
+    }
+    cell_pages.push_back(static_cast<cl_uint>(pages.size()));
+  }
+  set_window(std::move(pages), std::move(page_cells), {});
+  cell_pages_list_.send(std::move(cell_pages));
+}
+
+void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks) {
+  close_window();  // nothing is listed if the list cannot be sent
+  pages_list_.send(pages);
+  page_cells_list_.send(page_cells);
+  new_ranks_list_.send(new_ranks);
+  window_pages_ = std::move(pages);
+  page_cells_ = std::move(page_cells);
+  new_ranks_ = std::move(new_ranks);
+}
+
+/// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
+void SurfelMap::close_window() {
+  window_pages_.clear();
+  page_cells_.clear();
+  new_ranks_.clear();
+}
+
+std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
+  std::vector<Page> near;
+  const auto add = [&](const BlockIndex::Pages& pages) { near.insert(near.end(), pages.begin(), pages.end()); };
+  const std::vector<BlockKey> around = window_.blocks_near(distance, index_.blocks().size());
+  for (const BlockKey& block : around)
+    if (const BlockIndex::Pages* pages = index_.find(block)) add(*pages);
+  if (around.empty()) {  // the map has fewer blocks than there are around
+    for (const auto& [block, pages] : index_.blocks())
+      if (window_.is_near(block, distance)) add(pages);
+  }
+  list.write(near);
+  return near.size();
+}
+
+void SurfelMap::reserve(std::size_t additional) {
+  const std::size_t blocks = std::min<std::size_t>(additional, window_.cells());
+  grow(index_.end() + additional / PAGE_SLOTS + blocks);
+}
+
+void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
+  if (count == 0) return;
+  if (!new_ranks_.empty()) list_window();  // what was inserted before has added pages
+  const auto cell_count = static_cast<cl_uint>(window_.cells());
+  free_before_.resize(window_pages() + 1);
+  cell_begin_.resize(cell_count + 1);
+  missing_.resize(cell_count);
+  order_.resize(count);
+  if (commands_.device().long_loops && count <= kFewToSort)
+    commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
+                  alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
+  else
+    sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
+  add_pages(missing_.read(cell_count));
+
+  commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), page_cells_list_(),
+                static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
+                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), surfels_());
+  size_ += count;
+}
+
+void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count) {
+  const auto pages = static_cast<cl_uint>(window_pages());
+  const std::size_t bins = SORT_CHUNKS * static_cast<std::size_t>(cell_count);
+  histogram_.resize(bins + 1);
+  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, cell_count, histogram_());
+  lists_.prefix_sums(stage, histogram_, bins);
+  if (pages == 0) free_before_.fill(stage, 0, 1);
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), free_before_());
+  lists_.prefix_sums(stage, free_before_, pages);
+  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
+                missing_());
+  commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), count, histogram_(), order_());
+}
+
+/// Adds pages to the window, behind those that it has. @param missing  pages that each cell's block needs
+void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
+  grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
+  std::vector<Page> pages = window_pages_;
+  std::vector<cl_uint> page_cells = page_cells_, ranks;
+  for (std::size_t cell = 0; cell < missing.size(); ++cell) {
+    if (missing[cell] > 0) listed_cells_[cell] = true;
+    for (cl_uint rank = 0; rank < missing[cell]; ++rank) {
+      pages.push_back(index_.add_page(window_.block(static_cast<int>(cell))));
+      page_cells.push_back(static_cast<cl_uint>(cell));
+      ranks.push_back(rank);
+    }
+  }
+  if (!ranks.empty()) set_window(std::move(pages), std::move(page_cells), std::move(ranks));
+}
+
+std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
+  const auto count = static_cast<cl_uint>(window_pages());
+  changes_.resize(count + 1);
+  empty_.resize(count + 1);
+  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changes_(),
+                empty_());
+  const std::vector<cl_uchar> empty = empty_.read(count);
+  std::vector<BlockKey> shrunk;
+  for (cl_uint n = 0; n < count; ++n) {
+    if (!empty[n]) continue;
+    const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
+    index_.remove_page(block, window_pages_[n]);
+    shrunk.push_back(block);
+  }
+  return shrunk;
+}
+
+Changes SurfelMap::last_changes() {
+  const char* stage = "changes";
+  const std::uint32_t count = lists_.list_bits(stage, changes_, window_pages(), changed_slots_);
+  commands_.run(stage, "to_slots", count, kGroup, pages_list_(), changed_slots_(), count);
+  gathered_.resize(count);
+  gathered_blocks_.resize(count);
+  commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, alive_(), page_block_(), surfels_(), gathered_(),
+                gathered_blocks_());
+  const auto slots = changed_slots_.read(count);
+  const auto surfels = gathered_.read(count);
+  const auto blocks = gathered_blocks_.read(count);
+  Changes changes;
+  for (std::size_t n = 0; n < slots.size(); ++n) {
+    if (blocks[n].s[3] != 0)
+      changes.updated.push_back(to_surfel(surfels[n], blocks[n], slots[n]));
+    else
+      changes.removed.push_back(slots[n]);
+  }
+  return changes;
+}
+
+Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const {
+  Surfel surfel = unpack(packed, key_of(block), block_size_);
+  surfel.id = slot;
+  return surfel;
+}
+
+/// Brings pages to the host, some at a time.
+void SurfelMap::visit(const std::vector<Page>& pages, const PageVisitor& visitor) const {
+  const auto alive = alive_.read(index_.end());
+  const auto blocks = page_block_.read(index_.end());
+  DeviceArray<cl_uint> list(commands_);
+  DeviceArray<cl_uint4> gathered(commands_);
+  for (std::size_t begin = 0; begin < pages.size(); begin += kGathered) {
+    const std::vector<Page> some(pages.begin() + begin, pages.begin() + std::min(begin + kGathered, pages.size()));
+    list.write(some);
+    gathered.resize(PAGE_SLOTS * some.size());
+    commands_.run("changes", "gather_pages", PAGE_SLOTS * some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(),
+                  gathered());
+    const auto surfels = gathered.read(PAGE_SLOTS * some.size());
+    for (std::size_t n = 0; n < some.size(); ++n) visitor(some[n], blocks[some[n]], alive[some[n]], &surfels[PAGE_SLOTS * n]);
+  }
+}
+
+std::vector<Surfel> SurfelMap::download() const {
+  const auto alive = alive_.read(index_.end());
+  std::vector<Page> pages;
+  for (Page page = 0; page < alive.size(); ++page)
+    if (alive[page] != 0) pages.push_back(page);
+  std::vector<Surfel> surfels;
+  surfels.reserve(size());
+  visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
+    for_each_bit(alive, [&](std::uint32_t n) { surfels.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
+  });
+  return surfels;
+}
+
+Changes SurfelMap::changes(std::uint64_t since) const {
+  const auto blocks = page_block_.read(index_.end());
+  std::vector<Page> pages;
+  for (Page page = 0; page < blocks.size(); ++page)
+    if (static_cast<std::uint32_t>(blocks[page].s[3]) > since) pages.push_back(page);
+  Changes changes;
+  visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
+    for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
+    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+  });
+  return changes;
+}
+
+std::size_t SurfelMap::allocated_bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes(); }
+
+std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes(); }
+
+std::size_t SurfelMap::untouched_bytes() const {
+  if (!commands_.device().is_cpu) return 0;
+  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);  // `alive` and `changed` are cleared as a whole
+  return surfels_.bytes() + page_block_.bytes() - kPage * index_.end();
+}
+
+}  // namespace frontier_surfels

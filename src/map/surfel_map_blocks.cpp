@@ -1,0 +1,126 @@
+/// The map's blocks between frames: replaced as a whole, and taken out and in for the archive.
+#include <algorithm>
+#include <utility>
+
+#include "common/shared.h"
+#include "map/bits.hpp"
+#include "map/surfel_map.hpp"
+#include "map/surfel_packing.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr float kFarthest = 1e6F;     // [m]; blocks are counted in 32 bits, and floats have 24
+constexpr double kLargestRadius = 4;  // [block]; the window, around all that surfels may reach, must not become large without end
+
+}  // namespace
+
+std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
+  BlockIndex index;
+  std::vector<cl_uint4> packed;
+  std::vector<cl_ulong> alive;
+  std::vector<cl_int4> blocks;
+  std::vector<std::uint32_t> slots;
+  double largest = 0;
+  for (const Surfel& surfel : surfels) {
+    if (!(surfel.position.array().abs() < kFarthest).all())  // nor is it a number
+      throw Error("A surfel lies more than 1000 km from the world's origin: this is no map of a robot's surroundings.");
+    const BlockKey block = block_of(surfel.position, block_size_);
+    const BlockIndex::Pages* pages = index.find(block);
+    if (pages == nullptr || alive[pages->back()] == ~cl_ulong{0}) {
+      index.add_page(block);
+      pages = index.find(block);
+      alive.push_back(0);
+      packed.resize(PAGE_SLOTS * alive.size());
+      blocks.push_back({{block.x, block.y, block.z, static_cast<cl_int>(frame)}});
+    }
+    const Page page = pages->back();
+    const auto n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page]));
+    alive[page] |= cl_ulong{1} << n;
+    slots.push_back(PAGE_SLOTS * page + n);
+    Surfel kept = surfel;
+    kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size_));
+    packed[slots.back()] = pack(kept, block, block_size_);
+    largest = std::max<double>(largest, kept.radius);
+  }
+  grow(std::max(alive.size(), index_.end()));
+  close_window();
+  // What was there is noted as changed as well.
+  const std::size_t before = index_.end();
+  index.skip_to(before);
+  for (; alive.size() < before; blocks.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) alive.push_back(0);
+  surfels_.write(packed);
+  alive_.write(alive);
+  changed_.write(std::vector<cl_ulong>(alive.size(), 0));  // a frame that failed may have left something there
+  page_block_.write(blocks);
+  index_ = std::move(index);
+  size_ = surfels.size();
+  largest_radius_ = largest;
+  return slots;
+}
+
+std::vector<BlockKey> SurfelMap::blocks_changed_since(std::uint32_t frame) const {
+  const auto blocks = page_block_.read(index_.end());
+  std::vector<BlockKey> changed;
+  for (const auto& [block, pages] : index_.blocks()) {
+    const auto is_newer = [&](Page page) { return static_cast<std::uint32_t>(blocks[page].s[3]) > frame; };
+    if (std::any_of(pages.begin(), pages.end(), is_newer)) changed.push_back(block);
+  }
+  std::sort(changed.begin(), changed.end());
+  return changed;
+}
+
+std::vector<StoredBlock> SurfelMap::read_blocks(const std::vector<BlockKey>& blocks) const {
+  std::vector<StoredBlock> stored;
+  std::vector<Page> pages;
+  std::vector<std::size_t> owners;  // of the pages
+  for (const BlockKey& block : blocks) {
+    const BlockIndex::Pages* some = index_.find(block);
+    if (some != nullptr) {
+      pages.insert(pages.end(), some->begin(), some->end());
+      owners.resize(pages.size(), stored.size());
+    }
+    stored.push_back({block, {}});
+  }
+  auto owner = owners.begin();
+  visit(pages, [&](Page, const cl_int4&, cl_ulong alive, const cl_uint4* surfels) {
+    std::vector<std::uint8_t>& bytes = stored[*owner++].second;
+    for_each_bit(alive, [&](std::uint32_t n) {
+      const auto* begin = reinterpret_cast<const std::uint8_t*>(&surfels[n]);
+      bytes.insert(bytes.end(), begin, begin + sizeof(cl_uint4));
+    });
+  });
+  return stored;
+}
+
+void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>& bytes, std::uint32_t frame) {
+  const std::vector<cl_uint4> surfels = to_surfels(bytes);
+  const std::size_t pages = (surfels.size() + PAGE_SLOTS - 1) / PAGE_SLOTS;
+  grow(index_.end() + pages);
+  close_window();
+  for (std::size_t n = 0; n < pages; ++n) {
+    const auto begin = surfels.begin() + PAGE_SLOTS * n;
+    const std::vector<cl_uint4> some(begin, std::min(begin + PAGE_SLOTS, surfels.end()));
+    const Page page = index_.add_page(block);
+    surfels_.write(some, PAGE_SLOTS * page);
+    alive_.write({some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1}, page);
+    changed_.write({0}, page);
+    page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
+  }
+  size_ += surfels.size();
+  for (const cl_uint4& packed : surfels) largest_radius_ = std::max<double>(largest_radius_, unpack(packed, block, block_size_).radius);
+}
+
+void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
+  const BlockIndex::Pages* found = index_.find(block);
+  if (found == nullptr) return;
+  close_window();
+  for (const Page page : BlockIndex::Pages(*found)) {
+    size_ -= static_cast<std::size_t>(__builtin_popcountll(alive_.read_one(page)));
+    alive_.write({0}, page);
+    page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
+    index_.remove_page(block, page);
+  }
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,68 @@
+#include "opencl/lists.hpp"
+
+#include "common/shared.h"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kFew = 2048, kFewOfCpu = 65536;  // one more launch would take longer
+constexpr std::size_t kFewWords = 1 << 18;             // on a CPU: two more
+constexpr std::size_t kRoom = 1 << 14;
+
+}  // namespace
+
+Lists::Lists(Commands& commands)
+    : commands_(commands),
+      few_(commands.device().long_loops ? kFewOfCpu : kFew),
+      counts_(commands),
+      levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
+              DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
+
+std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
+  if (count == 0) return 0;
+  prefix_sums(stage, values, count);
+  return values.read_one(count);
+}
+
+void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
+  const auto n = static_cast<cl_uint>(count);
+  if (count <= few_) {
+    commands_.run(stage, "scan_few", 1, 1, values(), n);
+    return;
+  }
+  DeviceArray<cl_uint>& sums = levels_[level];
+  const std::size_t chunks = (count + SCAN_CHUNK - 1) / SCAN_CHUNK;
+  sums.resize(chunks + 1);
+  commands_.run(stage, "sum_chunks", chunks, kGroup, values(), n, sums());
+  scan_level(stage, sums, chunks, level + 1);
+  commands_.run(stage, "scan_chunks", chunks, kGroup, values(), n, sums());
+}
+
+std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
+  if (count == 0) return 0;
+  const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
+  const auto words = static_cast<cl_uint>(count);
+  if (commands_.device().long_loops && count <= kFewWords) return list_few_bits(stage, bits, words, list);
+  counts_.resize(chunks + 1);
+  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
+  const std::uint32_t total = scan(stage, counts_, chunks);
+  list.resize(total);
+  if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, counts_(), list());
+  return total;
+}
+
+/// The list's room is what earlier ones have needed; when it is not enough, all is done again.
+std::uint32_t Lists::list_few_bits(const char* stage, const DeviceArray<cl_ulong>& bits, cl_uint words, DeviceArray<cl_uint>& list) {
+  list.resize(kRoom);
+  counts_.resize(1);
+  for (;;) {
+    const std::size_t room = list.bytes() / sizeof(cl_uint);
+    commands_.run(stage, "list_few_bits", 1, 1, bits(), words, list(), static_cast<cl_uint>(room), counts_());
+    const std::uint32_t total = counts_.read_one(0);
+    if (total <= room) return total;
+    list.resize(total);
+  }
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,93 @@
+#include "recordings/bag_transforms.hpp"
+
+#include <tf2/exceptions.h>
+
+#include <cmath>
+
+#include "frontier_surfels/types.hpp"
+#include "ros/input/conversions.hpp"
+
+namespace frontier_surfels::replay {
+
+using messages::strip_slash;
+
+namespace {
+
+constexpr double kQuaternionTolerance = 1e-2;
+constexpr double kForever = 1e9;  // [s]; longer than any bag, and still far from what ros::Time can hold
+
+bool is_usable(const geometry_msgs::TransformStamped& transform) {
+  const auto& t = transform.transform.translation;
+  const auto& q = transform.transform.rotation;
+  const double norm = Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm();
+  const bool finite = std::isfinite(t.x) && std::isfinite(t.y) && std::isfinite(t.z);
+  const bool named = !transform.header.frame_id.empty() && !transform.child_frame_id.empty();
+  return finite && named && transform.header.frame_id != transform.child_frame_id && std::abs(norm - 1) <= kQuaternionTolerance;
+}
+
+}  // namespace
+
+void normalise(geometry_msgs::Quaternion& q) {
+  const double norm = Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm(), deviation = std::abs(norm - 1);
+  const bool is_rounding = deviation < 1e-6;  // stays bit for bit
+  if (is_rounding || !(deviation <= kQuaternionTolerance)) return;
+  q.x /= norm;
+  q.y /= norm;
+  q.z /= norm;
+  q.w /= norm;
+}
+
+BagTransforms::BagTransforms() : buffer_(ros::Duration(kForever)) {}
+
+void BagTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
+  for (geometry_msgs::TransformStamped transform : message.transforms) {
+    transform.header.frame_id = strip_slash(transform.header.frame_id);
+    transform.child_frame_id = strip_slash(transform.child_frame_id);
+    if (!is_usable(transform)) {
+      ++damaged_;
+      continue;
+    }
+    if (!is_static && !seen_.emplace(transform.child_frame_id, transform.header.stamp).second) continue;
+    normalise(transform.transform.rotation);
+    try {
+      buffer_.setTransform(transform, "bag", is_static);
+      parent_of_[transform.child_frame_id] = transform.header.frame_id;
+    } catch (const std::runtime_error&) {  // a stamp near the end of ros::Time
+      ++damaged_;
+    }
+  }
+}
+
+std::string BagTransforms::root_of(const std::string& frame) const {
+  std::set<std::string> passed;  // a broken tree may have loops
+  std::string root = frame;
+  for (auto it = parent_of_.find(root); it != parent_of_.end() && passed.insert(root).second; it = parent_of_.find(root)) root = it->second;
+  if (root == frame) throw Error("No transform in /tf or /tf_static has '" + frame + "' as its child; there are: " + frames() + ".");
+  return root;
+}
+
+bool BagTransforms::knows(const std::string& frame) const {
+  if (parent_of_.count(frame)) return true;
+  for (const auto& [child, parent] : parent_of_) {
+    if (parent == frame) return true;
+  }
+  return false;
+}
+
+std::string BagTransforms::frames() const {
+  std::string text;
+  for (const auto& [child, parent] : parent_of_) text += (text.empty() ? "" : ", ") + parent + " -> " + child;
+  return text.empty() ? "none" : text;
+}
+
+Eigen::Isometry3d BagTransforms::T_world_frame(const std::string& world, const std::string& frame, const ros::Time& stamp) const {
+  if (stamp.isZero()) throw BadFrame("its stamp is 0, which is no time");
+  if (frame == world) throw BadFrame("its frame is the world frame '" + world + "' itself");
+  try {
+    return messages::to_isometry(buffer_.lookupTransform(world, frame, stamp).transform);
+  } catch (const tf2::TransformException& error) {
+    throw BadFrame("its pose is not known (" + std::string(error.what()) + ")");
+  }
+}
+
+}  // namespace frontier_surfels::replay

@@ -1,0 +1,249 @@
+#include "recordings/bag_writer.hpp"
+
+#include <cv_bridge/cv_bridge.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/image_encodings.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+#include "ros/input/conversions.hpp"
+
+namespace frontier_surfels::replay {
+
+using messages::CompressedDepthHeader;
+using messages::InverseDepthQuantisation;
+
+namespace {
+
+namespace encodings = sensor_msgs::image_encodings;
+constexpr float kMillimetresPerMetre = 1000.0f;
+
+/// The inverse depth's resolution is that of 16 bits from 1 m on; compressed_depth_image_transport's own choice.
+InverseDepthQuantisation default_quantisation() {
+  constexpr float kLargestDepth = 10, kQuantisation = 100;
+  const float a = kQuantisation * (kQuantisation + 1);
+  return {a, 1 - a / kLargestDepth};
+}
+
+/// REP 118: no measurement is NaN.
+cv::Mat to_metres(const cv::Mat& depth) {
+  if (depth.type() == CV_32FC1) return depth;
+  cv::Mat metres(depth.size(), CV_32FC1);
+  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [](std::uint16_t value) {
+    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) / kMillimetresPerMetre;
+  });
+  return metres;
+}
+
+/// 16 bits of `value`; 0, no measurement, for what they cannot hold.
+std::uint16_t to_sixteen_bits(float value) {
+  return std::isfinite(value) && value > 0 && value < 65535.5f ? static_cast<std::uint16_t>(std::lround(value)) : 0;
+}
+
+cv::Mat to_millimetres(const cv::Mat& depth) {
+  if (depth.type() == CV_16UC1) return depth;
+  cv::Mat millimetres(depth.size(), CV_16UC1);
+  std::transform(depth.begin<float>(), depth.end<float>(), millimetres.begin<std::uint16_t>(),
+                 [](float value) { return to_sixteen_bits(value * kMillimetresPerMetre); });
+  return millimetres;
+}
+
+sensor_msgs::CompressedImage to_compressed_depth(const cv::Mat& depth, const std::string& encoding) {
+  CompressedDepthHeader header{};
+  cv::Mat values = depth;
+  if (encoding == encodings::TYPE_32FC1) {
+    header.quantisation = default_quantisation();
+    values = cv::Mat(depth.size(), CV_16UC1);
+    std::transform(depth.begin<float>(), depth.end<float>(), values.begin<std::uint16_t>(),
+                   [&](float metres) { return to_sixteen_bits(header.quantisation.a / metres + header.quantisation.b); });
+  }
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", values, png);
+
+  sensor_msgs::CompressedImage message;
+  message.format = encoding + "; compressedDepth";
+  message.data.resize(sizeof(header));
+  std::memcpy(message.data.data(), &header, sizeof(header));
+  message.data.insert(message.data.end(), png.begin(), png.end());
+  return message;
+}
+
+sensor_msgs::CompressedImage to_jpeg(const cv::Mat& color) {
+  sensor_msgs::CompressedImage message;
+  message.format = "bgr8; jpeg compressed bgr8";
+  cv::imencode(".jpg", color, message.data, {cv::IMWRITE_JPEG_QUALITY, 95});
+  return message;
+}
+
+sensor_msgs::CameraInfo to_camera_info(const Intrinsics& intrinsics) {
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(intrinsics.width);
+  info.height = static_cast<std::uint32_t>(intrinsics.height);
+  info.distortion_model = "plumb_bob";
+  info.D.assign(5, 0.0);
+  info.K = {intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {intrinsics.fx, 0, intrinsics.cx, 0, 0, intrinsics.fy, intrinsics.cy, 0, 0, 0, 1, 0};
+  return info;
+}
+
+struct Link {
+  const char* parent;
+  const char* child;
+  Eigen::Isometry3d T_parent_child;
+};
+
+/// From the tracked body to the optical frame. The numbers are those of a plausible mount: a camera a few centimetres from the body's
+/// centre, and the turn from x forward to z forward.
+std::vector<Link> constant_links() {
+  const Eigen::Isometry3d optical(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5));
+  return {{"kinect", "openni_camera", Eigen::Isometry3d(Eigen::Translation3d(0.03125, 0, 0.0625))},
+          {"openni_camera", "openni_rgb_frame", Eigen::Isometry3d(Eigen::Translation3d(0, -0.046875, 0))},
+          {"openni_rgb_frame", "openni_rgb_optical_frame", optical}};
+}
+
+class Writer {
+ public:
+  Writer(const std::string& path, const BagOptions& options) : options_(options), links_(constant_links()) {
+    bag_.open(path, rosbag::bagmode::Write);
+    if (options.compression == "lz4") bag_.setCompression(rosbag::compression::LZ4);
+    if (options.compression == "bz2") bag_.setCompression(rosbag::compression::BZ2);
+  }
+
+  void write(const RecordedFrame& frame, const ros::Time& stamp) {
+    write_transforms(frame.T_world_camera, stamp);
+    write_depth(frame, stamp);
+    if (!frame.color.empty()) write_color(frame, stamp);
+    first_ = false;
+  }
+
+  void close() { bag_.close(); }
+
+ private:
+  void write_transforms(const Eigen::Isometry3d& T_world_camera, const ros::Time& stamp) {
+    Eigen::Isometry3d T_kinect_camera = Eigen::Isometry3d::Identity();
+    tf2_msgs::TFMessage constant;
+    for (const Link& link : links_) {
+      T_kinect_camera = T_kinect_camera * link.T_parent_child;
+      constant.transforms.push_back(to_message(link, stamp));
+    }
+    tf2_msgs::TFMessage moving;
+    moving.transforms.push_back(to_message({"world", "kinect", T_world_camera * T_kinect_camera.inverse()}, stamp));
+    if (!options_.static_transforms) {
+      moving.transforms.insert(moving.transforms.end(), constant.transforms.begin(), constant.transforms.end());
+    } else if (first_) {
+      bag_.write("/tf_static", stamp, constant, latched_header());
+    }
+    bag_.write("/tf", stamp, moving);
+  }
+
+  void write_depth(const RecordedFrame& frame, const ros::Time& stamp) {
+    const cv::Mat depth = options_.encoding == encodings::TYPE_32FC1 ? to_metres(frame.depth) : to_millimetres(frame.depth);
+    if (options_.compressed) {
+      publish(options_.depth_topic + "/compressedDepth", to_compressed_depth(depth, options_.encoding), stamp);
+    } else {
+      publish(options_.depth_topic, *cv_bridge::CvImage(std_msgs::Header(), options_.encoding, depth).toImageMsg(), stamp);
+    }
+    publish(options_.depth_info_topic, to_camera_info(frame.intrinsics), stamp);
+  }
+
+  void write_color(const RecordedFrame& frame, const ros::Time& stamp) {
+    if (options_.compressed) {
+      publish(options_.color_topic + "/compressed", to_jpeg(frame.color), stamp);
+    } else {
+      publish(options_.color_topic, *cv_bridge::CvImage(std_msgs::Header(), encodings::BGR8, frame.color).toImageMsg(), stamp);
+    }
+    publish(options_.color_info_topic, to_camera_info(frame.intrinsics), stamp);
+  }
+
+  template <typename Message>
+  void publish(const std::string& topic, Message message, const ros::Time& stamp) {
+    message.header.stamp = stamp;
+    message.header.frame_id = frame_name("openni_rgb_optical_frame");
+    bag_.write(topic, stamp, message);
+  }
+
+  std::string frame_name(const std::string& name) const { return (options_.leading_slashes ? "/" : "") + name; }
+
+  geometry_msgs::TransformStamped to_message(const Link& link, const ros::Time& stamp) const {
+    geometry_msgs::TransformStamped message;
+    message.header.stamp = stamp;
+    message.header.frame_id = frame_name(link.parent);
+    message.child_frame_id = frame_name(link.child);
+    const Eigen::Vector3d translation = link.T_parent_child.translation();
+    const Eigen::Quaterniond rotation = Eigen::Quaterniond(link.T_parent_child.rotation()).normalized();
+    message.transform.translation.x = translation.x();
+    message.transform.translation.y = translation.y();
+    message.transform.translation.z = translation.z();
+    message.transform.rotation.x = rotation.x();
+    message.transform.rotation.y = rotation.y();
+    message.transform.rotation.z = rotation.z();
+    message.transform.rotation.w = rotation.w();
+    return message;
+  }
+
+  /// `rosbag play` gives it to those who subscribe later, too.
+  static boost::shared_ptr<ros::M_string> latched_header() {
+    namespace traits = ros::message_traits;
+    return boost::make_shared<ros::M_string>(ros::M_string{{"latching", "1"},
+                                                           {"callerid", "/sequence_to_bag"},
+                                                           {"type", traits::datatype<tf2_msgs::TFMessage>()},
+                                                           {"md5sum", traits::md5sum<tf2_msgs::TFMessage>()},
+                                                           {"message_definition", traits::definition<tf2_msgs::TFMessage>()}});
+  }
+
+  BagOptions options_;
+  std::vector<Link> links_;
+  rosbag::Bag bag_;
+  bool first_ = true;
+};
+
+void check(const BagOptions& options) {
+  if (options.encoding != "32FC1" && options.encoding != "16UC1") {
+    throw Error("Depth is written as 32FC1 or 16UC1, not as '" + options.encoding + "'.");
+  }
+  if (options.compression != "none" && options.compression != "lz4" && options.compression != "bz2") {
+    throw Error("A bag's compression is none, lz4 or bz2, not '" + options.compression + "'.");
+  }
+}
+
+ros::Time to_ros_time(double stamp) {
+  if (!(stamp > 0) || stamp >= std::numeric_limits<std::uint32_t>::max()) {
+    throw Error("The stamp " + std::to_string(stamp) +
+                " s is no time of ROS, which has them above 0 and below 2^32: correct the recording's stamps.");
+  }
+  return ros::Time(stamp);
+}
+
+}  // namespace
+
+BagSummary write_bag(FrameSource& source, const std::string& path, const BagOptions& options) {
+  check(options);
+  const std::string temporary = path + ".active";
+  BagSummary summary;
+  try {
+    Writer writer(temporary, options);
+    while (const std::optional<RecordedFrame> frame = source.next()) {
+      if (summary.frames == 0 && frame->stamp < 1) summary.stamp_shift = 1 - std::floor(frame->stamp);
+      writer.write(*frame, to_ros_time(frame->stamp + summary.stamp_shift));
+      ++summary.frames;
+    }
+    writer.close();
+    if (summary.frames == 0) throw Error("None of the recording's frames can be used: no bag is written.");
+    std::filesystem::rename(temporary, path);
+  } catch (const std::exception& error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    if (dynamic_cast<const Error*>(&error)) throw;
+    throw FileError(path + " cannot be written (" + error.what() + "): check that the folder exists and has space.");
+  }
+  return summary;
+}
+
+}  // namespace frontier_surfels::replay

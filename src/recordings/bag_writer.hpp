@@ -1,0 +1,35 @@
+/// Writes recorded frames as a bag.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "recordings/frame_source.hpp"
+
+namespace frontier_surfels::replay {
+
+/// Topics and frames are those of the TUM RGB-D benchmark's bags, leading slashes included.
+struct BagOptions {
+  std::string depth_topic = "/camera/depth/image";
+  std::string depth_info_topic = "/camera/depth/camera_info";
+  std::string color_topic = "/camera/rgb/image_color";
+  std::string color_info_topic = "/camera/rgb/camera_info";
+  std::string encoding = "32FC1";   ///< of depth: 32FC1 [m], or 16UC1 [mm]
+  bool compressed = false;          ///< compressedDepth (16UC1 without loss; 32FC1 quantised, up to 10 m) and JPEG on topics named after it
+  std::string compression = "lz4";  ///< of the bag: none, lz4, bz2
+  bool leading_slashes = true;      ///< of frame names
+  bool static_transforms = false;   ///< constant transforms go to /tf_static, latched; else to /tf, with each frame
+};
+
+struct BagSummary {
+  std::size_t frames = 0;
+  double stamp_shift = 0;  ///< [s] added to all stamps
+};
+
+/// Writes what is left of `source` to `path`, through a temporary file beside it.
+/// ROS has no time 0 (tf takes it for "the latest"): where the first stamp is below 1 s, all are shifted by 1 s, or by as many whole
+/// seconds as bring it above.
+/// @throws Error
+BagSummary write_bag(FrameSource& source, const std::string& path, const BagOptions& options = {});
+
+}  // namespace frontier_surfels::replay

@@ -1,0 +1,212 @@
+#include "recordings/folder_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "recordings/text_files.hpp"
+
+namespace frontier_surfels::replay {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kAssociationTolerance = 0.020;  // [s]
+constexpr double kQuaternionTolerance = 1e-2;    // a norm further from 1 is no rounding
+constexpr float kTumUnitsPerMetre = 5000.0f;
+
+bool is_image(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+bool is_number(const fs::path& path) {
+  const std::string stem = path.stem().string();
+  return stem.find_first_not_of("0123456789") == std::string::npos;
+}
+
+/// Images of a folder in the order of their names; names that are all numbers in the order of the numbers, padded with zeros or not.
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> images;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && is_image(entry.path())) images.push_back(entry.path());
+  }
+  std::sort(images.begin(), images.end());
+  if (std::all_of(images.begin(), images.end(), is_number)) {
+    const auto digits = [](const fs::path& path) {
+      const std::string stem = path.stem().string();
+      return stem.substr(std::min(stem.find_first_not_of('0'), stem.size() - 1));
+    };
+    std::stable_sort(images.begin(), images.end(), [&](const fs::path& a, const fs::path& b) {
+      const std::string digits_a = digits(a), digits_b = digits(b);
+      return digits_a.size() != digits_b.size() ? digits_a.size() < digits_b.size() : digits_a < digits_b;
+    });
+  }
+  return images;
+}
+
+/// An image, or an empty one whatever is wrong with the file.
+cv::Mat read_image(const fs::path& path, int flags) {
+  try {
+    return cv::imread(path.string(), flags);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+}
+
+/// @throws BadFrame if the numbers are no pose
+Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
+  if (numbers.empty()) {
+    throw BadFrame("no pose lies within " + std::to_string(std::lround(kAssociationTolerance * 1e3)) + " ms of its stamp");
+  }
+  if (!std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); })) {
+    throw BadFrame("its pose is not finite");
+  }
+  const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
+    throw BadFrame("its pose's quaternion has the length " + std::to_string(rotation.norm()) + " instead of 1");
+  }
+  return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
+}
+
+/// The element of `sorted` (by stamp) nearest to `stamp`; null if none is within the tolerance.
+template <typename T>
+const T* nearest(const std::vector<T>& sorted, double stamp) {
+  auto after = std::lower_bound(sorted.begin(), sorted.end(), stamp, [](const T& element, double value) { return element.stamp < value; });
+  const T* best = nullptr;
+  double best_distance = kAssociationTolerance;
+  for (auto it = after == sorted.begin() ? after : std::prev(after); it != sorted.end() && it <= after; ++it) {
+    const double distance = std::abs(it->stamp - stamp);
+    if (distance <= best_distance) {
+      best = &*it;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+FolderSource::FolderSource(const fs::path& folder, const SourceOptions& options) : folder_(folder) {
+  if (fs::exists(folder / "poses.txt")) {
+    list_numbered_images();
+  } else if (fs::exists(folder / "groundtruth.txt") && fs::exists(folder / "depth.txt")) {
+    list_tum_images();
+  } else {
+    throw Error(folder.string() +
+                " is no recording: it needs depth/, poses.txt and camera.txt, or TUM RGB-D's depth.txt and groundtruth.txt.");
+  }
+  selection_ = select_frames(options, entries_.size(), folder.string());
+}
+
+void FolderSource::list_numbered_images() {
+  if (!fs::is_directory(folder_ / "depth")) throw Error(folder_.string() + " has a poses.txt, but no folder depth/ with the images.");
+  intrinsics_ = read_camera(folder_ / "camera.txt");
+  const std::vector<StampedPose> poses = read_poses(folder_ / "poses.txt");
+  const std::vector<fs::path> images = images_in(folder_ / "depth");
+  if (poses.size() != images.size()) {
+    throw Error(folder_.string() + " has " + std::to_string(poses.size()) + " poses in poses.txt for " + std::to_string(images.size()) +
+                " images in depth/: there must be one line for each image.");
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    fs::path color;
+    for (const char* extension : {".jpg", ".jpeg", ".png"}) {
+      const fs::path candidate = folder_ / "color" / images[i].stem().concat(extension);
+      if (color.empty() && fs::exists(candidate)) color = candidate;
+    }
+    entries_.push_back({poses[i].stamp, images[i], color, poses[i].pose});
+  }
+}
+
+void FolderSource::list_tum_images() {
+  tum_layout_ = true;
+  if (fs::exists(folder_ / "camera.txt")) {
+    intrinsics_ = read_camera(folder_ / "camera.txt");
+  } else {
+    choose_tum_camera();
+  }
+  const auto by_stamp = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
+  std::vector<StampedPose> poses = read_poses(folder_ / "groundtruth.txt");
+  poses.erase(std::remove_if(poses.begin(), poses.end(), [](const StampedPose& pose) { return !std::isfinite(pose.stamp); }), poses.end());
+  std::stable_sort(poses.begin(), poses.end(), by_stamp);
+  std::vector<StampedFile> colors;
+  if (fs::exists(folder_ / "rgb.txt")) colors = read_file_list(folder_ / "rgb.txt");
+  std::stable_sort(colors.begin(), colors.end(), by_stamp);
+
+  for (const StampedFile& image : read_file_list(folder_ / "depth.txt")) {
+    const StampedPose* pose = nearest(poses, image.stamp);
+    const StampedFile* color = nearest(colors, image.stamp);
+    entries_.push_back(
+        {image.stamp, folder_ / image.file, color ? folder_ / color->file : fs::path(), pose ? pose->pose : std::vector<double>()});
+  }
+}
+
+/// The calibration that the benchmark publishes for the camera named in the folder's name.
+void FolderSource::choose_tum_camera() {
+  const struct {
+    const char* name;
+    const char* short_name;
+    Intrinsics intrinsics;
+  } kCameras[] = {{"freiburg1", "fr1", {517.3, 516.5, 318.6, 255.3, 640, 480}},
+                  {"freiburg2", "fr2", {520.9, 521.0, 325.1, 249.7, 640, 480}},
+                  {"freiburg3", "fr3", {535.4, 539.2, 320.1, 247.6, 640, 480}}};
+  const fs::path full = fs::weakly_canonical(folder_);
+  const std::string name = full.filename().string();
+  for (const auto& camera : kCameras) {
+    if (name.find(camera.name) == std::string::npos && name.find(camera.short_name) == std::string::npos) continue;
+    intrinsics_ = camera.intrinsics;
+    notes_.push_back("There is no camera.txt in " + folder_.string() + ": TUM's calibration of " + camera.name +
+                     " is used, as the folder's name says.");
+    return;
+  }
+  throw Error(folder_.string() +
+              " has no camera.txt, and its name says none of freiburg1, freiburg2, freiburg3: write the line `fx fy cx cy width height` "
+              "into camera.txt.");
+}
+
+std::optional<RecordedFrame> FolderSource::next() {
+  while (done_ < selection_.count) {
+    const Entry& entry = entries_[selection_.first + done_++ * selection_.stride];
+    try {
+      return read(entry);
+    } catch (const BadFrame& fault) {
+      skipped_.push_back("Frame " + entry.depth.string() + " is passed over: " + fault.what() + ".");
+    }
+  }
+  return std::nullopt;
+}
+
+RecordedFrame FolderSource::read(const Entry& entry) {
+  RecordedFrame frame;
+  if (!std::isfinite(entry.stamp)) throw BadFrame("its stamp is not finite");
+  frame.stamp = entry.stamp;
+  frame.T_world_camera = to_pose(entry.pose);
+  frame.intrinsics = intrinsics_;
+  if (!fs::exists(entry.depth)) throw BadFrame("there is no such image");
+  frame.depth = read_image(entry.depth, cv::IMREAD_UNCHANGED);
+  if (frame.depth.empty()) throw BadFrame("the image cannot be read");
+  if (frame.depth.type() != CV_16UC1) throw BadFrame("the image does not have one channel of 16 bits");
+  if (frame.depth.size() != cv::Size(intrinsics_.width, intrinsics_.height)) {
+    throw BadFrame("the image has " + std::to_string(frame.depth.cols) + "x" + std::to_string(frame.depth.rows) +
+                   " pixels, but the camera " + std::to_string(intrinsics_.width) + "x" + std::to_string(intrinsics_.height));
+  }
+  if (tum_layout_) {
+    cv::Mat metres(frame.depth.size(), CV_32FC1);
+    std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), metres.begin<float>(),
+                   [](std::uint16_t value) { return static_cast<float>(value) / kTumUnitsPerMetre; });
+    frame.depth = metres;
+  }
+  if (!entry.color.empty()) frame.color = read_color(entry, frame.depth.size());
+  return frame;
+}
+
+/// Colour is an extra: what is wrong with it costs no frame.
+cv::Mat FolderSource::read_color(const Entry& entry, const cv::Size& size) {
+  const cv::Mat color = read_image(entry.color, cv::IMREAD_COLOR);
+  if (color.size() == size) return color;
+  notes_.push_back("Colour image " + entry.color.string() + (color.empty() ? " cannot be read" : " has another size than the depth image") +
+                   ": its frame is used without colour.");
+  return {};
+}
+
+}  // namespace frontier_surfels::replay

@@ -1,0 +1,52 @@
+/// Sequences kept as images and text files in a folder.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "recordings/frame_source.hpp"
+#include "recordings/selection.hpp"
+
+namespace frontier_surfels::replay {
+
+/// Reads either of two layouts:
+///   depth/NAME.png (16 bit, mm) + poses.txt + camera.txt, optionally color/NAME.jpg or .png
+///   TUM RGB-D: depth.txt + groundtruth.txt (images of 16 bit, 5000 a metre), optionally rgb.txt and camera.txt
+/// poses.txt and groundtruth.txt have lines `stamp tx ty tz qx qy qz qw`, camera to world, optical frame; camera.txt has `fx fy cx cy width
+/// height`.
+class FolderSource : public FrameSource {
+ public:
+  FolderSource(const std::filesystem::path& folder, const SourceOptions& options);
+
+  std::size_t size() const override { return selection_.count; }
+  std::optional<RecordedFrame> next() override;
+  const std::vector<std::string>& skipped() const override { return skipped_; }
+  const std::vector<std::string>& notes() const override { return notes_; }
+
+ private:
+  /// What belongs together, before any image is read.
+  struct Entry {
+    double stamp = 0;  ///< [s]
+    std::filesystem::path depth;
+    std::filesystem::path color;  ///< empty where there is none
+    std::vector<double> pose;     ///< tx ty tz qx qy qz qw as recorded; empty where there is none
+  };
+
+  void list_numbered_images();
+  void list_tum_images();
+  void choose_tum_camera();
+  RecordedFrame read(const Entry& entry);
+  cv::Mat read_color(const Entry& entry, const cv::Size& size);
+
+  std::filesystem::path folder_;
+  std::vector<Entry> entries_;
+  Intrinsics intrinsics_;
+  bool tum_layout_ = false;
+  Selection selection_;
+  std::size_t done_ = 0;  ///< of the selection
+  std::vector<std::string> skipped_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace frontier_surfels::replay

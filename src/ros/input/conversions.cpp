@@ -1,0 +1,147 @@
+#include "ros/input/conversions.hpp"
+
+#include <boost/predef/other/endian.h>
+#include <cv_bridge/cv_bridge.h>
+#include <image_geometry/pinhole_camera_model.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+namespace frontier_surfels::messages {
+namespace {
+
+namespace encodings = sensor_msgs::image_encodings;
+constexpr bool kThisMachineIsBigEndian = BOOST_ENDIAN_BIG_BYTE;
+
+/// Checks that an image has the bytes that its size asks for. In 64 bits: damaged sizes overflow 32.
+void check_size(const sensor_msgs::Image& image, std::size_t bytes_per_pixel) {
+  const std::uint64_t bytes = static_cast<std::uint64_t>(image.step) * image.height;
+  if (image.width == 0 || image.height == 0) throw BadFrame("the image is empty");
+  if (image.data.size() != bytes) {
+    throw BadFrame("the image has " + std::to_string(image.data.size()) + " bytes instead of " + std::to_string(bytes));
+  }
+  if (image.step < static_cast<std::uint64_t>(image.width) * bytes_per_pixel) throw BadFrame("the image's step is shorter than its rows");
+}
+
+/// Copies depth into rows without gaps and into this machine's byte order. cv_bridge does not: it gives two channels of bytes where the
+/// order differs.
+cv::Mat unpack_depth(const sensor_msgs::Image& image, int type) {
+  const std::size_t size = CV_ELEM_SIZE(type);
+  check_size(image, size);
+  cv::Mat depth(static_cast<int>(image.height), static_cast<int>(image.width), type);
+  const bool swap = static_cast<bool>(image.is_bigendian) != kThisMachineIsBigEndian;
+  for (int row = 0; row < depth.rows; ++row) {
+    std::uint8_t* values = depth.ptr(row);
+    std::memcpy(values, &image.data[static_cast<std::size_t>(row) * image.step], size * image.width);
+    if (!swap) continue;
+    for (std::uint32_t column = 0; column < image.width; ++column) std::reverse(values + size * column, values + size * (column + 1));
+  }
+  return depth;
+}
+
+cv::Mat unpack_color(const sensor_msgs::Image& image) {
+  check_size(image, 1);
+  try {
+    return cv_bridge::toCvCopy(image, encodings::BGR8)->image;
+  } catch (const std::exception&) {
+    throw BadFrame("the image cannot be unpacked (encoding '" + image.encoding + "', step " + std::to_string(image.step) + ")");
+  }
+}
+
+cv::Mat decode(const std::uint8_t* data, std::size_t size, int flags) {
+  const cv::Mat bytes(1, static_cast<int>(size), CV_8UC1, const_cast<std::uint8_t*>(data));
+  cv::Mat image;
+  try {
+    if (size > 0) image = cv::imdecode(bytes, flags);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) throw BadFrame("the compressed image cannot be decoded");
+  return image;
+}
+
+cv::Mat metres_from_inverse(const cv::Mat& values, const InverseDepthQuantisation& quantisation) {
+  cv::Mat metres(values.size(), CV_32FC1);
+  std::transform(values.begin<std::uint16_t>(), values.end<std::uint16_t>(), metres.begin<float>(), [&](std::uint16_t value) {
+    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : quantisation.a / (static_cast<float>(value) - quantisation.b);
+  });
+  return metres;
+}
+
+cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
+  const bool has_header = message.format.find("compressedDepth") != std::string::npos;
+  const std::size_t offset = has_header ? sizeof(CompressedDepthHeader) : 0;
+  if (message.data.size() <= offset) throw BadFrame("the compressed image is empty");
+  if (message.format.find("rvl") != std::string::npos) throw BadFrame("RVL compression is not supported: record compressedDepth as PNG");
+
+  const cv::Mat values = decode(message.data.data() + offset, message.data.size() - offset, cv::IMREAD_UNCHANGED);
+  if (values.type() != CV_16UC1) throw BadFrame("the compressed image is not one of 16-bit depth");
+  if (!has_header || message.format.compare(0, encodings::TYPE_32FC1.size(), encodings::TYPE_32FC1) != 0) return values;
+
+  CompressedDepthHeader header;
+  std::memcpy(&header, message.data.data(), sizeof(header));
+  return metres_from_inverse(values, header.quantisation);
+}
+
+}  // namespace
+
+cv::Mat depth_image(const ImageMessage& message) {
+  if (message.compressed) return decode_depth(*message.compressed);
+  const std::string& encoding = message.raw->encoding;
+  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16) return unpack_depth(*message.raw, CV_16UC1);
+  if (encoding == encodings::TYPE_32FC1) return unpack_depth(*message.raw, CV_32FC1);
+  throw BadFrame("the encoding '" + encoding + "' is not one of depth (16UC1, mono16, 32FC1)");
+}
+
+cv::Mat color_image(const ImageMessage& message) {
+  if (message.raw) return unpack_color(*message.raw);
+  return decode(message.compressed->data.data(), message.compressed->data.size(), cv::IMREAD_COLOR);
+}
+
+Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {
+  sensor_msgs::CameraInfo rectified = info;
+  if (info.P[0] == 0) rectified.P = {info.K[0], 0, info.K[2], 0, 0, info.K[4], info.K[5], 0, 0, 0, 1, 0};
+  image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
+  try {
+    model.fromCameraInfo(rectified);
+  } catch (const std::exception& error) {
+    throw BadFrame("its camera_info cannot be used (" + std::string(error.what()) + ")");
+  }
+  const cv::Size size = model.reducedResolution();
+  const Intrinsics intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
+  for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy}) {
+    if (!std::isfinite(number)) throw BadFrame("its camera_info is not finite");
+  }
+  if (!(intrinsics.fx > 0) || !(intrinsics.fy > 0)) throw BadFrame("its camera_info has no focal length");
+  return intrinsics;
+}
+
+Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& image_size) {
+  Intrinsics intrinsics = to_intrinsics(info);
+  const cv::Size said(intrinsics.width, intrinsics.height);
+  if (said.width > 0 && said.height > 0 && said != image_size) {
+    throw BadFrame("the image has " + std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
+                   " pixels, but its camera_info says " + std::to_string(said.width) + "x" + std::to_string(said.height));
+  }
+  intrinsics.width = image_size.width;
+  intrinsics.height = image_size.height;
+  return intrinsics;
+}
+
+Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
+  const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z);
+  const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);
+  if (!translation.allFinite() || !rotation.coeffs().allFinite() || rotation.norm() < 1e-3) throw BadFrame("its pose is not finite");
+  return Eigen::Translation3d(translation) * rotation.normalized();
+}
+
+std::string strip_slash(const std::string& name) {
+  const std::size_t start = name.find_first_not_of('/');
+  return start == std::string::npos ? std::string() : name.substr(start);
+}
+
+}  // namespace frontier_surfels::messages

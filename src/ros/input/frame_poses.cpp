@@ -1,0 +1,60 @@
+#include "ros/input/frame_poses.hpp"
+
+#include <tf2/exceptions.h>
+
+#include <sstream>
+
+#include "frontier_surfels/types.hpp"
+#include "ros/input/conversions.hpp"
+
+namespace frontier_surfels {
+
+using messages::strip_slash;
+
+FramePoses::FramePoses(const ros::NodeHandle& nh, std::string world_frame)
+    : world_frame_(strip_slash(world_frame)), listener_(buffer_, nh, true) {}
+
+bool FramePoses::has(const std::string& frame, const ros::Time& stamp, std::string* why) const {
+  const std::string camera = strip_slash(frame);  // of the world frame itself tf knows the identity, which is no camera's pose
+  return camera != world_frame_ && buffer_.canTransform(world_frame_, camera, stamp, why);
+}
+
+Eigen::Isometry3d FramePoses::T_world_frame(const std::string& frame, const ros::Time& stamp) const {
+  try {
+    return messages::to_isometry(buffer_.lookupTransform(world_frame_, strip_slash(frame), stamp).transform);
+  } catch (const tf2::TransformException& error) {
+    throw BadFrame(error.what());
+  }
+}
+
+std::string FramePoses::explain(const std::string& frame, const ros::Time& stamp) const {
+  const std::string camera = strip_slash(frame), between = "from '" + camera + "' to '" + world_frame_ + "'";
+  if (camera == world_frame_) return "the image's frame is the world frame '" + world_frame_ + "' itself: set ~world_frame";
+  const ros::Time any;
+  std::string why;
+  if (!buffer_.canTransform(world_frame_, camera, any, &why))
+    return "tf has no transform " + between + " (" + why + "): check ~world_frame, the image's frame_id, and that tf is published";
+
+  std::ostringstream text;
+  text.precision(3);
+  try {
+    const double ahead = messages::seconds(buffer_.lookupTransform(world_frame_, camera, any).header.stamp, stamp);
+    text << "tf's newest transform " << between << " is " << std::abs(ahead) << " s " << (ahead > 0 ? "older" : "newer")
+         << " than the image: "
+         << (ahead > 0 ? "raise ~tf_timeout, or check the clocks of camera and tf" : "the image comes too late for tf's memory");
+  } catch (const tf2::TransformException& error) {  // gone in between
+    text << error.what();
+  }
+  return text.str();
+}
+
+void FramePoses::forget_future(const std::string& frame, const ros::Time& stamp) {
+  constexpr double kFuture = 2;  // [s]; a little may be there rightly, from a replay that sends tf ahead
+  try {
+    const ros::Time newest = buffer_.lookupTransform(world_frame_, strip_slash(frame), ros::Time()).header.stamp;
+    if (messages::seconds(stamp, newest) > kFuture) buffer_.clear();
+  } catch (const tf2::TransformException&) {  // nothing there, so nothing to forget
+  }
+}
+
+}  // namespace frontier_surfels

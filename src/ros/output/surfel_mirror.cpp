@@ -1,0 +1,125 @@
+#include "ros/output/surfel_mirror.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+namespace frontier_surfels {
+namespace {
+
+bool by_id(const Surfel& a, const Surfel& b) { return a.id < b.id; }
+
+/// The number of slots that the changes need. @throws Error
+std::size_t slots_for(const Changes& changes) {
+  std::size_t slots = 0;
+  for (const Surfel& surfel : changes.updated) slots = std::max(slots, std::size_t{surfel.id} + 1);
+  if (slots > kMostSurfels)
+    throw Error("The changes of the map are damaged: no surfel has the id " + std::to_string(slots - 1) + "; ask for the whole map.");
+  return slots;
+}
+
+template <typename Wanted>
+std::vector<Surfel> pick(const std::vector<Surfel>& slots, std::size_t most, Wanted wanted) {
+  std::vector<Surfel> surfels;
+  surfels.reserve(most);
+  for (const Surfel& slot : slots)
+    if (exists(slot) && wanted(slot)) surfels.push_back(slot);
+  return surfels;
+}
+
+/// Ordered by id, and of several with one id the last alone.
+void order(std::vector<Surfel>& surfels) {
+  if (!std::is_sorted(surfels.begin(), surfels.end(), by_id)) std::stable_sort(surfels.begin(), surfels.end(), by_id);
+  const auto same = [](const Surfel& a, const Surfel& b) { return a.id == b.id; };
+  surfels.erase(surfels.begin(), std::unique(surfels.rbegin(), surfels.rend(), same).base());
+}
+
+void order(std::vector<std::uint32_t>& ids) {
+  if (!std::is_sorted(ids.begin(), ids.end())) std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
+/// `surfels` without those whose ids are in `ids`; both ordered.
+std::vector<Surfel> without(const std::vector<Surfel>& surfels, const std::vector<std::uint32_t>& ids) {
+  std::vector<Surfel> left;
+  left.reserve(surfels.size());
+  auto id = ids.begin();
+  for (const Surfel& surfel : surfels) {
+    while (id != ids.end() && *id < surfel.id) ++id;
+    if (id == ids.end() || *id != surfel.id) left.push_back(surfel);
+  }
+  return left;
+}
+
+}  // namespace
+
+Eigen::AlignedBox3f SurfelMirror::apply(const Changes& changes, std::uint64_t since, const Visit& visit) {
+  if (since != 0 && since != sequence_)
+    throw Error("The changes begin at number " + std::to_string(since) + ", but the copy of the map is of number " +
+                std::to_string(sequence_) + ": ask for the whole map.");
+  const std::size_t slots = slots_for(changes);
+  if (slots > slots_.size()) slots_.resize(slots);
+
+  Eigen::AlignedBox3f box;
+  const auto remove = [&](Surfel& slot) {
+    if (!exists(slot)) return;
+    box.extend(slot.position);
+    if (visit) visit(slot, false);
+    --size_;
+    occupied_ -= slot.label == Label::kOccupied;
+    slot.radius = 0;
+  };
+  if (since == 0) std::for_each(slots_.begin(), slots_.end(), remove);
+  for (const std::uint32_t id : changes.removed)
+    if (id < slots_.size()) remove(slots_[id]);
+  for (const Surfel& surfel : changes.updated) {
+    Surfel& slot = slots_[surfel.id];
+    remove(slot);
+    if (!exists(surfel)) continue;
+    slot = surfel;
+    ++size_;
+    occupied_ += surfel.label == Label::kOccupied;
+    box.extend(surfel.position);
+    if (visit) visit(surfel, true);
+  }
+  sequence_ = changes.sequence;
+  return box;
+}
+
+std::vector<Surfel> SurfelMirror::surfels() const {
+  return pick(slots_, size_, [](const Surfel&) { return true; });
+}
+
+std::vector<Surfel> SurfelMirror::surfels(Label label) const {
+  return pick(slots_, label == Label::kOccupied ? occupied_ : size_ - occupied_, [label](const Surfel& s) { return s.label == label; });
+}
+
+std::vector<Surfel> SurfelMirror::surfels(const Eigen::AlignedBox3f& box_world) const {
+  return pick(slots_, 0, [&](const Surfel& s) { return box_world.contains(s.position); });
+}
+
+Changes merge(Changes earlier, Changes later) {
+  for (Changes* changes : {&earlier, &later}) {
+    order(changes->updated);
+    order(changes->removed);
+  }
+  Changes merged;
+  merged.sequence = later.sequence;
+
+  // set_union takes the first one's where both have an id: the later one's.
+  const std::vector<Surfel> kept = without(earlier.updated, later.removed);
+  merged.updated.reserve(kept.size() + later.updated.size());
+  std::set_union(later.updated.begin(), later.updated.end(), kept.begin(), kept.end(), std::back_inserter(merged.updated), by_id);
+
+  std::vector<std::uint32_t> removed;
+  removed.reserve(earlier.removed.size() + later.removed.size());
+  std::set_union(earlier.removed.begin(), earlier.removed.end(), later.removed.begin(), later.removed.end(), std::back_inserter(removed));
+  auto surfel = merged.updated.begin();
+  for (const std::uint32_t id : removed) {
+    while (surfel != merged.updated.end() && surfel->id < id) ++surfel;
+    if (surfel == merged.updated.end() || surfel->id != id) merged.removed.push_back(id);
+  }
+  return merged;
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,87 @@
+#include "synthetic/synthetic_sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace frontier_surfels::replay {
+namespace {
+
+constexpr double kDisparityStep = 2.85e-3;     // [1/m]; Khoshelham and Elberink, Sensors 2012: depth resolution 2.85e-3 z^2
+constexpr double kDisparityDeviation = 0.5;    // [step]
+constexpr double kGrazingCosine = 0.17;        // 80 degrees
+constexpr double kJump = 0.04;                 // relative step of depth between neighbours that is an edge
+constexpr double kLostAtEdges = 0.7;           // share of pixels
+constexpr double kSmallestBlob = 2.0 / 640.0;  // radius over image width
+constexpr double kLargestBlob = 16.0 / 640.0;
+
+/// cv::RNG's own sequence is the same everywhere, but similar seeds start it alike: stir the seed (splitmix64).
+std::uint64_t stirred(std::uint64_t seed, int index) {
+  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(index) + 1;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+void add_noise(cv::Mat& depth, cv::RNG& random) {
+  std::for_each(depth.begin<float>(), depth.end<float>(), [&](float& z) {
+    if (!(z > 0)) return;
+    const double steps = std::round(1 / (z * kDisparityStep) + random.gaussian(kDisparityDeviation));
+    z = steps >= 1 ? static_cast<float>(1 / (steps * kDisparityStep)) : 0.0f;
+  });
+}
+
+bool is_jump(float a, float b) { return std::abs(a - b) > kJump * std::min(a, b); }
+
+void drop_edges(cv::Mat& depth, const cv::Mat& cos_incidence, cv::RNG& random) {
+  const cv::Mat before = depth.clone();
+  const auto jumps_at = [&](int row, int column) {
+    const float z = before.at<float>(row, column);
+    return (row > 0 && is_jump(z, before.at<float>(row - 1, column))) ||
+           (row + 1 < before.rows && is_jump(z, before.at<float>(row + 1, column))) ||
+           (column > 0 && is_jump(z, before.at<float>(row, column - 1))) ||
+           (column + 1 < before.cols && is_jump(z, before.at<float>(row, column + 1)));
+  };
+  for (int row = 0; row < depth.rows; ++row) {
+    for (int column = 0; column < depth.cols; ++column) {
+      const bool weak = cos_incidence.at<float>(row, column) < kGrazingCosine || jumps_at(row, column);
+      if (weak && random.uniform(0.0, 1.0) < kLostAtEdges) depth.at<float>(row, column) = 0;
+    }
+  }
+}
+
+/// Discs of random size until the share of the image is covered.
+void drop_blobs(cv::Mat& depth, double share, cv::RNG& random) {
+  cv::Mat lost = cv::Mat::zeros(depth.size(), CV_8UC1);
+  const double wanted = std::min(share, 1.0) * static_cast<double>(depth.total());
+  for (double covered = 0; covered < wanted;) {
+    const double radius = std::max(0.5, random.uniform(kSmallestBlob, kLargestBlob) * depth.cols);
+    const double u = random.uniform(0.0, static_cast<double>(depth.cols)), v = random.uniform(0.0, static_cast<double>(depth.rows));
+    for (int row = std::max(0, static_cast<int>(v - radius)); row < std::min(depth.rows, static_cast<int>(v + radius) + 1); ++row) {
+      for (int column = std::max(0, static_cast<int>(u - radius)); column < std::min(depth.cols, static_cast<int>(u + radius) + 1);
+           ++column) {
+        if (covered >= wanted || lost.at<std::uint8_t>(row, column) || std::hypot(column - u, row - v) > radius) continue;
+        lost.at<std::uint8_t>(row, column) = 1;
+        ++covered;
+      }
+    }
+  }
+  depth.setTo(0, lost);
+}
+
+}  // namespace
+
+cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index) {
+  cv::RNG random(stirred(sensor.seed, index));
+  cv::Mat measured = depth.clone();
+  if (sensor.noise) add_noise(measured, random);
+  if (sensor.dropouts > 0) {
+    drop_edges(measured, cos_incidence, random);
+    drop_blobs(measured, sensor.dropouts, random);
+  }
+  cv::Mat millimetres(depth.size(), CV_16UC1);
+  std::transform(measured.begin<float>(), measured.end<float>(), millimetres.begin<std::uint16_t>(),
+                 [](float z) { return z < 65.535f ? static_cast<std::uint16_t>(std::lround(z * 1000)) : 0; });
+  return millimetres;
+}
+
+}  // namespace frontier_surfels::replay

@@ -1,0 +1,16 @@
+/// From exact depth to what a sensor would have measured.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "synthetic/synthetic_room.hpp"
+
+namespace frontier_surfels::replay {
+
+/// @param depth          CV_32FC1 [m]; 0: nothing
+/// @param cos_incidence  CV_32FC1, between ray and surface normal
+/// @param index          of the frame: each has its own random numbers
+/// @return               CV_16UC1 [mm]
+cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index);
+
+}  // namespace frontier_surfels::replay
