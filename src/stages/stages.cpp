@@ -18,6 +18,8 @@ Limits make_limits(const Config& config) {
   limits.split_radius = 2 * std::sqrt(3.0F);
   limits.create_radius = std::sqrt(3.0F) / 2;
   limits.normal_min = 0.01F;
+  limits.back_probe = static_cast<float>(kBackProbe);
+  limits.front_probe = static_cast<float>(kFrontProbe) * limits.create_radius;
   limits.min_gap = static_cast<float>(config.min_gap);
   limits.surface_depth = static_cast<float>(config.surface_depth);
   limits.median_votes = config.median_votes;
@@ -25,8 +27,6 @@ Limits make_limits(const Config& config) {
 }
 
 std::size_t tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }
-
-std::size_t chunks(std::size_t count) { return (count + LANES - 1) / LANES; }
 
 bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
@@ -105,13 +105,13 @@ void Stages::set_grid(const WorkingImage& image) {
   pixels_j_.write(view.pixels_j);
   words_i_.write(view.words_i);
   column_end_.resize(image.depth.size());
-  valid_.resize(image_chunks());
+  valid_.resize(image_words());
   allocate_grid();
   intrinsics_ = image.intrinsics;
 }
 
 void Stages::allocate_grid() {
-  observed_.allocate(words() + LANES);  // vectors are read beyond the last row's end
+  observed_.allocate(words() + SPARE_WORDS);
   filtered_.allocate(words());
   candidates_.allocate(candidate_words());
 }
@@ -126,7 +126,7 @@ void Stages::allocate_paths() {
   hull_.allocate(2 * (j * w + i * w + i * j));
 }
 
-std::size_t Stages::image_chunks() const { return 2 * ((grid_.width + 31) / 32) * static_cast<std::size_t>(grid_.height); }
+std::size_t Stages::image_words() const { return (grid_.width + 31) / 32 * static_cast<std::size_t>(grid_.height); }
 
 std::size_t Stages::candidate_words() const {
   return VIEW_TILE * VIEW_TILE * tiles(grid_.size_i) * tiles(grid_.size_j) * static_cast<std::size_t>(grid_.words_k);
@@ -134,10 +134,12 @@ std::size_t Stages::candidate_words() const {
 
 void Stages::observe_space() {
   const char* stage = "observed_space";
-  commands_.run(stage, "column_ends", image_chunks(), kGroup, grid_, depth_(), layer_depth_(), column_end_(), valid_());
+  if (commands_.lanes() == 1) valid_.fill(stage, 0, image_words());
+  commands_.run(stage, "column_ends", 32 / commands_.lanes() * image_words(), kGroup, grid_, depth_(), layer_depth_(), column_end_(),
+                valid_());
   const std::size_t rows = (grid_.size_j + SPACE_ROWS - 1) / SPACE_ROWS;
-  commands_.run(stage, "observed_space", chunks(grid_.size_i) * grid_.words_k * rows, large_group(), grid_, column_end_(), valid_(),
-                pixels_i_(), pixels_j_(), words_i_(), observed_());
+  commands_.run(stage, "observed_space", commands_.chunks(grid_.size_i) * grid_.words_k * rows, large_group(), grid_, column_end_(),
+                valid_(), pixels_i_(), pixels_j_(), words_i_(), observed_());
 }
 
 std::vector<cl_uint> Stages::visit_surfels() {
@@ -146,10 +148,10 @@ std::vector<cl_uint> Stages::visit_surfels() {
   in_view_bits_.resize(pages + 1);
   large_bits_.resize(pages + 1);
   removed_bits_.resize(pages + 1);
-  commands_.run(stage, "visit_surfels", PAGE_ITEMS * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_, views_.own_view(),
-                static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(), column_end_(),
-                map_.pages(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), observed_(), candidates_(),
-                map_.changed(), in_view_bits_(), large_bits_(), removed_bits_(), counts_());
+  commands_.run(stage, "visit_surfels", PAGE_SLOTS / commands_.lanes() * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_,
+                views_.own_view(), static_cast<cl_int>(config_.remove_buried), static_cast<cl_int>(has_color_), views_.depths(), depth_(),
+                column_end_(), map_.pages(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), observed_(),
+                candidates_(), map_.changed(), in_view_bits_(), large_bits_(), removed_bits_(), counts_());
   std::vector<cl_uint> counts = counts_.read(COUNTS);
   removed_ = counts[COUNT_REMOVED];
   return counts;
@@ -167,14 +169,14 @@ std::size_t Stages::split_surfels() {
   const std::uint32_t parents = lists_.list_bits(stage, large_bits_, map_.window_pages(), split_slots_);
   commands_.run(stage, "to_slots", parents, kGroup, map_.pages(), split_slots_(), parents);
   split_offsets_.resize(parents + 1);
-  commands_.run(stage, "count_children", parents, kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
-                split_slots_(), parents, split_offsets_());
+  commands_.run(stage, "count_children", commands_.chunks(parents), kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(),
+                map_.surfels(), split_slots_(), parents, split_offsets_());
   const std::uint32_t children = lists_.scan(stage, split_offsets_, parents);
   map_.reserve(children);
   new_surfels_.resize(children);
   new_cells_.resize(children);
-  commands_.run(stage, "split", parents, kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
-                split_slots_(), parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
+  commands_.run(stage, "split", commands_.chunks(parents), kGroup, grid_, limits_, window_, T_camera_local_, map_.page_block(),
+                map_.surfels(), split_slots_(), parents, split_offsets_(), new_surfels_(), new_cells_(), map_.alive(), map_.changed());
   map_.removed(parents);
   map_.insert(stage, new_surfels_, new_cells_, children);
   find_candidates();  // parents have taken some off
@@ -188,8 +190,8 @@ void Stages::place_surfels() {
   const auto count = static_cast<cl_uint>(in_view_);
   view_surfels_.resize(std::max<std::size_t>(in_view_, 1));  // the sign field is computed without surfels, too
   commands_.run(stage, "to_slots", in_view_, kGroup, map_.pages(), in_view_slots_(), count);
-  commands_.run(stage, "place_surfels", in_view_, kGroup, grid_, window_, T_camera_local_, map_.page_block(), map_.surfels(),
-                in_view_slots_(), count, view_surfels_());
+  commands_.run(stage, "place_surfels", commands_.chunks(in_view_), kGroup, grid_, window_, T_camera_local_, map_.page_block(),
+                map_.surfels(), in_view_slots_(), count, view_surfels_());
 }
 
 void Stages::compute_sign_field() {
@@ -215,8 +217,8 @@ void Stages::compute_known_hull() {
   const std::size_t i = grid_.size_i, j = grid_.size_j, k = grid_.size_k, w = grid_.words_k;
   hull_faces_.fill(stage, 0xffffffffU, 2 * (j * k + i * k + i * j));
   const std::size_t pages = map_.list_pages_near(kHullReach * config_.z_max, near_pages_);
-  commands_.run(stage, "project_hull", PAGE_ITEMS * pages, kGroup, grid_, limits_, window_, T_camera_local_, near_pages_(),
-                static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), lines_(), hull_faces_());
+  commands_.run(stage, "project_hull", PAGE_SLOTS / commands_.lanes() * pages, kGroup, grid_, limits_, window_, T_camera_local_,
+                near_pages_(), static_cast<cl_uint>(pages), map_.alive(), map_.page_block(), map_.surfels(), lines_(), hull_faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), grid_, hull_faces_(),
                 hull_());
@@ -235,8 +237,8 @@ void Stages::filter_median() { commands_.run("median", "median", words(), kGroup
 void Stages::find_candidates() {
   counts_.resize(COUNTS);
   const std::size_t rows = VIEW_TILE * tiles(grid_.size_j);
-  commands_.run("candidates", "find_candidates", chunks(grid_.size_i) * grid_.words_k * rows, kGroup, grid_, observed_(), candidates_(),
-                counts_());
+  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(grid_.size_i)) * grid_.words_k * rows, kGroup, grid_,
+                observed_(), candidates_(), counts_());
 }
 
 void Stages::settle_by_recent_views() {
@@ -251,7 +253,7 @@ void Stages::settle_by_recent_views() {
   list_candidates();
   tile_views_.resize(1);
   if (config_.min_gap > 0)
-    commands_.run(stage, "close_gaps", chunks(listed_count_), large_group(), grid_, limits_, views_.own_view(), views_.views(),
+    commands_.run(stage, "close_gaps", commands_.chunks(listed_count_), large_group(), grid_, limits_, views_.own_view(), views_.views(),
                   tile_views_(), static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), depth_(), column_end_(),
                   listed_voxels_(), static_cast<cl_int>(listed_count_), directions_(), candidates_());
   if (!is_open()) return;
@@ -265,17 +267,18 @@ std::size_t Stages::large_group() const { return commands_.device().is_cpu ? 1 :
 void Stages::list_candidates() {
   const char* stage = "recent_views";
   listed_count_ = lists_.list_bits(stage, candidates_, candidate_words(), listed_voxels_);
-  around_.resize(chunks(listed_count_) * LANES);
-  directions_.resize(chunks(listed_count_) * 3 * LANES);
-  commands_.run(stage, "find_directions", chunks(listed_count_), large_group(), grid_, layer_depth_(), observed_(), listed_voxels_(),
-                static_cast<cl_int>(listed_count_), around_(), directions_());
+  around_.resize(commands_.chunks(listed_count_) * commands_.lanes());
+  directions_.resize(commands_.chunks(listed_count_) * 3 * commands_.lanes());
+  commands_.run(stage, "find_directions", commands_.chunks(listed_count_), large_group(), grid_, layer_depth_(), observed_(),
+                listed_voxels_(), static_cast<cl_int>(listed_count_), around_(), directions_());
 }
 
 void Stages::filter_candidates() {
   const char* stage = "creation";
   const std::size_t words = (listed_count_ + 63) / 64;
   kept_bits_.resize(words + 1);
-  commands_.run(stage, "filter_candidates", 64 / LANES * words, large_group(), grid_, limits_, listed_voxels_(),
+  if (commands_.lanes() == 1) kept_bits_.fill(stage, 0, words);
+  commands_.run(stage, "filter_candidates", 64 / commands_.lanes() * words, large_group(), grid_, limits_, listed_voxels_(),
                 static_cast<cl_int>(listed_count_), directions_(), candidates_(), static_cast<cl_int>(is_open()), filtered_(),
                 kept_bits_());
   created_count_ = lists_.list_bits(stage, kept_bits_, words, created_);
@@ -295,7 +298,7 @@ std::size_t Stages::remove_surfels() {
 
 std::size_t Stages::create_surfels() {
   const char* stage = "creation";
-  commands_.run(stage, "create_surfels", chunks(created_count_), large_group(), grid_, limits_, window_, T_local_camera_,
+  commands_.run(stage, "create_surfels", commands_.chunks(created_count_), large_group(), grid_, limits_, window_, T_local_camera_,
                 static_cast<cl_int>(config_.refine_surfels), views_.own_view(), views_.views(), tile_views_(),
                 static_cast<cl_int>(views_.view_groups()), views_.depths(), layer_depth_(), created_(), static_cast<cl_int>(created_count_),
                 listed_voxels_(), around_(), directions_(), new_surfels_(), new_cells_());
@@ -305,8 +308,8 @@ std::size_t Stages::create_surfels() {
 
 void Stages::label_surfels() {
   const std::size_t pages = map_.window_pages();
-  commands_.run("labels", "label_surfels", PAGE_ITEMS * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_, depth_(),
-                column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), static_cast<cl_uint>(pages), map_.alive(),
+  commands_.run("labels", "label_surfels", PAGE_SLOTS / commands_.lanes() * pages, PAGE_GROUP, grid_, limits_, window_, T_camera_local_,
+                depth_(), column_end_(), color_(), static_cast<cl_int>(has_color_), map_.pages(), static_cast<cl_uint>(pages), map_.alive(),
                 map_.changed(), map_.page_block(), map_.surfels());
 }
 

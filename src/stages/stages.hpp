@@ -60,8 +60,8 @@ class Stages {
   void set_grid(const WorkingImage& image);
   void allocate_grid();
   void allocate_paths();
-  std::size_t image_chunks() const;  ///< LANES pixels of a row each, an even number of them
-  std::size_t large_group() const;   ///< work items of a group where one item has much to do
+  std::size_t image_words() const;  ///< of 32 pixels of a row each
+  std::size_t large_group() const;  ///< work items of a group where one item has much to do
 
   Commands& commands_;
   Lists& lists_;
@@ -84,7 +84,7 @@ class Stages {
   SentArray<cl_uint> color_;
   DeviceArray<float> layer_depth_;
   DeviceArray<cl_int> column_end_;
-  DeviceArray<cl_ushort> valid_;
+  DeviceArray<cl_uint> valid_;
   DeviceArray<PixelRange> pixels_i_, pixels_j_, words_i_;
 
   // Bit fields
