@@ -13,11 +13,10 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
 INLINE uint chunk_begin(uint count, uint chunk) { return (uint)((ulong)count * chunk / SORT_CHUNKS); }
 
 // One work item handles a chunk of the new surfels.
-//   in  new_cells[count];   out histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell
-__kernel void count_cells(__global const uint* new_cells, const uint count, const uint cells, __global uint* histogram) {
+//   in  new_cells[count];   i/o histogram[cells][SORT_CHUNKS]: before: 0; after: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, const uint count, __global uint* histogram) {
   const uint chunk = get_global_id(0);
   if (chunk >= SORT_CHUNKS) return;
-  for (uint cell = 0; cell < cells; ++cell) histogram[SORT_CHUNKS * cell + chunk] = 0;
   for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
 }
 

@@ -171,7 +171,8 @@ void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cell
   const auto pages = static_cast<cl_uint>(window_pages());
   const std::size_t bins = SORT_CHUNKS * static_cast<std::size_t>(cell_count);
   histogram_.resize(bins + 1);
-  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, cell_count, histogram_());
+  histogram_.fill(stage, 0, bins);
+  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
   commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), free_before_());
