@@ -112,6 +112,15 @@ TEST(Config, AllProblemsAtOnce) {
   EXPECT_EQ(problems[3], "device_type is 'GPU': it must be any, cpu, gpu or accelerator.");
 }
 
+TEST(Config, LanesAreOneOrSixteen) {
+  Config config;
+  for (int lanes = 0; lanes <= 16; ++lanes) {
+    config.lanes = lanes;
+    const bool good = lanes == 0 || lanes == 1 || lanes == 16;
+    EXPECT_EQ(all_problems(config), good ? "" : "lanes is " + std::to_string(lanes) + ": it must be 0, 1 or 16.\n");
+  }
+}
+
 TEST(Config, EqualDepthsAreAProblem) {
   Config config;
   config.z_max = config.z_min;

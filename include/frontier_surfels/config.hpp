@@ -12,6 +12,7 @@ struct Config {
   std::string device_type = "any";
   int device_index = 0;
   int threads = 0;
+  int lanes = 0;
 
   // Working image and grid (paper 3.1)
   int decimation = 4;
@@ -67,6 +68,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"device_type", "", "any, cpu, gpu or accelerator"}, config.device_type);
   visit(FieldInfo{"device_index", "", "which of the fitting devices", 0, 255}, config.device_index);
   visit(FieldInfo{"threads", "", "compute units to use, where the device can be divided; 0: all", 0, 4096}, config.threads);
+  visit(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 elsewhere", 0, 16}, config.lanes);
 
   visit(FieldInfo{"decimation", "pixel", "every so many pixels of the depth image are used, in both directions", 1, 64}, config.decimation);
   visit(FieldInfo{"z_min", "m", "depth below which the grid is a cuboid; nearer measurements are ignored", 0.01, 100}, config.z_min);

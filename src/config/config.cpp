@@ -78,6 +78,7 @@ std::vector<std::string> Config::problems() const {
                        with_unit(range_text(info), info) + ".");
     }
   });
+  if (lanes > 1 && lanes < 16) faults.push_back("lanes is " + std::to_string(lanes) + ": it must be 0, 1 or 16.");
   if (z_max <= z_min) {
     faults.push_back("z_max is " + to_text(z_max) + " m, but z_min is " + to_text(z_min) + " m: z_max must be larger.");
   }

@@ -13,6 +13,9 @@
 
 namespace frontier_surfels {
 
+/// Options that the kernels are built with for a device.
+std::string build_options(const Device& device);
+
 /// Builds all kernels once; launches them by name and notes their times.
 class Commands {
  public:
@@ -22,6 +25,8 @@ class Commands {
   Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
+  std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< that a work item handles
+  std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< of LANES that `count` entries make
   cl::CommandQueue& queue() { return queue_; }
 
   /// Launches a kernel over at least `items` work items, in groups of `group`, and counts its time to `stage`.
