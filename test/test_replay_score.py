@@ -255,7 +255,7 @@ class Picture(unittest.TestCase):
         script = os.path.join(SOURCES, 'scripts', 'exploration_picture')
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'picture.png')
-            result = subprocess.run([script, os.path.dirname(PROGRAM), path, '--frames', '24'], capture_output=True, text=True, timeout=500)
+            result = subprocess.run([script, os.path.dirname(PROGRAM), path, '--frames', '48'], capture_output=True, text=True, timeout=500)
             self.assertEqual(result.returncode, DONE, result.stderr)
             picture = (255 * matplotlib.image.imread(path)[..., :3]).round()
         self.assertEqual(picture.shape[1], 640)
