@@ -72,8 +72,8 @@ cl_float4 pack4(const Vector3d& v) { return {{static_cast<float>(v.x()), static_
 Vector3d unpack4(const cl_float4& v) { return {v.s[0], v.s[1], v.s[2]}; }
 
 /// fx and fy differ in most of them.
-std::vector<Camera> grids() {
-  std::vector<Camera> all = cameras();
+std::vector<CameraSetup> grids() {
+  std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
   all.push_back(make_camera(20, 20, 10, 50, 60));
   return all;
@@ -89,7 +89,7 @@ std::vector<cl_float4> random_points(const Nuvg& grid, int count, Random& random
 }
 
 TEST(StageGrid, F) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     Random random(1);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -105,7 +105,7 @@ TEST(StageGrid, F) {
 }
 
 TEST(StageGrid, InverseOfF) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     Random random(2);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -121,7 +121,7 @@ TEST(StageGrid, InverseOfF) {
 }
 
 TEST(StageGrid, ContinuousAtZMin) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     const Grid g = make_view_grid(camera.intrinsics, camera.config).grid;
     std::vector<cl_float4> points;
@@ -135,7 +135,7 @@ TEST(StageGrid, ContinuousAtZMin) {
 }
 
 TEST(StageGrid, Voxels) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     Random random(3);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -236,7 +236,7 @@ TEST(StageGrid, LowestAndHighestBit) {
 }
 
 TEST(StageGrid, LayoutOfBitFields) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Random random(6);
     const Grid g = make_view_grid(camera.intrinsics, camera.config).grid;

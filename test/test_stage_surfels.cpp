@@ -86,10 +86,10 @@ std::vector<cl_float4> points(const Nuvg& grid, Random& random) {
 }
 
 TEST(StageSurfels, VoxelsOfPoints) {
-  std::vector<Camera> all = cameras();
+  std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
   all.push_back(make_camera(20, 20, 10, 50, 60));
-  for (const Camera& camera : all) {
+  for (const CameraSetup& camera : all) {
     SCOPED_TRACE(camera.name);
     Random random(1);
     const Nuvg grid(camera.intrinsics, camera.config);

@@ -1,0 +1,42 @@
+/// The OpenCL device that tests of stages run on.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <string>
+
+#include "opencl/commands.hpp"
+
+namespace frontier_surfels {
+
+/// The OpenCL platform to test on, part of its name; empty: the first.
+inline std::string test_platform() {
+  const char* platform = std::getenv("FRONTIER_SURFELS_TEST_PLATFORM");
+  return platform == nullptr ? "" : platform;
+}
+
+inline Device test_device() {
+  Config config;
+  config.platform = test_platform();
+  return choose_device(config);
+}
+
+/// Built once a program: compiling the kernels takes longer than most tests. Never destroyed: at the program's end a driver may be gone
+/// before it.
+inline Commands& test_commands() {
+  static auto* const commands = new Commands(test_device());
+  return *commands;
+}
+
+/// The same with one thread; null where the device cannot be limited to that.
+inline std::unique_ptr<Commands> one_thread_commands() {
+  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end()) return nullptr;
+  Config one;
+  one.platform = test_platform();
+  one.threads = 1;
+  return std::make_unique<Commands>(choose_device(one));
+}
+
+}  // namespace frontier_surfels
