@@ -58,11 +58,11 @@ struct Mapper::Impl {
         cameras(commands, config),
         observed(commands),
         candidates(commands),
-        visit(commands, config),
+        visit(commands),
         splitting(commands, lists),
         settling(commands),
         list(commands, lists),
-        creation(commands, lists, config) {
+        creation(commands, lists) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map);
     views.clear(archive->empty());

@@ -26,7 +26,7 @@ struct CreationFixture : FrameFixture {
         candidates(commands()),
         list(commands(), lists()),
         settling(commands()),
-        creation(commands(), lists(), config) {}
+        creation(commands(), lists()) {}
 
   /// Lists the candidates and filters them. @param with_known  looks at K~
   void filter(bool with_known = true) {

@@ -110,7 +110,7 @@ std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fi
   DeviceArray<cl_int> column_end(commands);
   column_end.write(std::vector<cl_int>(camera.intrinsics.width * camera.intrinsics.height, 0));
   Candidates candidates(commands);
-  SurfelVisit visit(commands, camera.config);
+  SurfelVisit visit(commands);
   candidates.find(fixture.frame(), observed, visit.counters());
   visit.visit(fixture.frame(), fixture.camera(), observed, column_end, fixture.views(), fixture.map(), candidates);
   view_surfels.place(fixture.frame(), visit.in_view(), fixture.map());

@@ -20,6 +20,8 @@ Limits make_limits(const Config& config) {
   limits.min_gap = static_cast<float>(config.min_gap);
   limits.surface_depth = static_cast<float>(config.surface_depth);
   limits.median_votes = config.median_votes;
+  limits.remove_buried = config.remove_buried ? 1 : 0;
+  limits.refine = config.refine_surfels ? 1 : 0;
   return limits;
 }
 

@@ -9,8 +9,8 @@ void Candidates::find(const Frame& frame, const BitField& observed, DeviceArray<
   candidates_.allocate(words(g));
   counters.resize(COUNTS);
   const std::size_t rows = VIEW_TILE * tiles(g.size_j);
-  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, g, observed(),
-                candidates_(), counters());
+  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, frame,
+                observed(), candidates_(), counters());
 }
 
 CandidateList::CandidateList(Commands& commands, Lists& lists)
@@ -22,8 +22,8 @@ void CandidateList::list(const Frame& frame, const Camera& camera, const BitFiel
   const std::size_t chunks = commands_.chunks(count_);
   around_.resize(chunks * commands_.lanes());
   directions_.resize(chunks * 3 * commands_.lanes());
-  commands_.run(stage, "find_directions", chunks, commands_.device().heavy_group(), frame.grid, camera.layer_depth()(), observed(),
-                voxels_(), static_cast<cl_int>(count_), around_(), directions_());
+  commands_.run(stage, "find_directions", chunks, commands_.device().heavy_group(), frame, camera.layer_depth()(), observed(), voxels_(),
+                static_cast<cl_int>(count_), around_(), directions_());
 }
 
 }  // namespace frontier_surfels

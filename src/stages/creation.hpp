@@ -11,7 +11,7 @@ namespace frontier_surfels {
 
 class Creation {
  public:
-  Creation(Commands& commands, Lists& lists, const Config& config);
+  Creation(Commands& commands, Lists& lists);
 
   /// Chooses the candidates that make a surfel: those that are not known and have a direction. Makes room for the surfels.
   /// @param known  K~ of the paper's section 3.2; null where the recent views have settled all
@@ -30,7 +30,6 @@ class Creation {
  private:
   Commands& commands_;
   Lists& lists_;
-  const bool refine_;
   std::size_t count_ = 0;
   BitField kept_;  ///< a bit for each listed candidate
   DeviceArray<cl_uint> chosen_;

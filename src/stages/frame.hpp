@@ -1,4 +1,4 @@
-/// What all stages of one frame are told.
+/// One frame, as all its stages and their kernels see it; and what their host sides have in common.
 #pragma once
 
 #include "common/shared.h"
@@ -9,16 +9,7 @@
 
 namespace frontier_surfels {
 
-struct Frame {
-  Grid grid;                 ///< of the frame's camera
-  Limits limits;             ///< of the method
-  Window window;             ///< the map's blocks around the grid
-  Transform T_camera_local;  ///< local: the window's frame
-  Transform T_local_camera;
-  View own_view;  ///< this frame's view, as its own camera sees it
-  cl_int has_color = 0;
-};
-
+/// What all stages of a frame, and their kernels, are told.
 Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const Limits& limits);
 
 /// A bit for each voxel of the grid (kernels/common/grid.cl says where), or for each surfel of the window's pages.

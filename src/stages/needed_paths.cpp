@@ -10,7 +10,7 @@ void NeededPaths::mark(const Frame& frame, const Candidates& candidates) {
   const char* stage = "needed_paths";
   lines_.allocate(size(frame.grid));
   lines_.fill(stage, 0, size(frame.grid));
-  commands_.run(stage, "mark_lines", words(frame.grid), kGroup, frame.grid, candidates.bits()(), lines_());
+  commands_.run(stage, "mark_lines", words(frame.grid), kGroup, frame, candidates.bits()(), lines_());
 }
 
 }  // namespace frontier_surfels

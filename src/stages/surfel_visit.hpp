@@ -14,7 +14,7 @@ class SurfelVisit {
     std::size_t in_view = 0, large = 0, removed = 0;  ///< surfels
   };
 
-  SurfelVisit(Commands& commands, const Config& config);
+  explicit SurfelVisit(Commands& commands);
 
   /// Candidates lose the voxels of surfels that stay. Nothing leaves the map yet.
   /// @param observed, column_end  of ObservedSpace
@@ -35,7 +35,6 @@ class SurfelVisit {
 
  private:
   Commands& commands_;
-  const bool remove_buried_;
   DeviceArray<cl_uint> counts_;
   BitField in_view_, large_, removed_;
 };

@@ -14,7 +14,7 @@ struct VisitFixture : FrameFixture {
         space(commands),
         observed(commands),
         candidates(commands),
-        visit(commands, config),
+        visit(commands),
         splitting(commands, lists()) {}
 
   /// Begins a frame with its own observed space and candidates.
