@@ -277,7 +277,7 @@ bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Resp
       response.sequence = mapper_.sequence();
       return box.min() == box.max() ? mapper_.surfels() : mapper_.surfels(box);
     });
-    response.surfels = messages::to_cloud(surfels);
+    response.surfels = messages::to_cloud(surfels, config_.confident_label());
   } catch (const std::exception& fault) {  // a service has no other way to say it
     ROS_WARN("~get_surfels cannot be answered: %s", fault.what());
     return false;

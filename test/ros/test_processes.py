@@ -37,8 +37,8 @@ class Processes(unittest.TestCase):
             self.assertRegex(output, sentence)
 
     def test_all_wrong_parameters_are_told_at_once(self):
-        self.check_refused('z_max.*number', 'decimation', 'on_time_jump.*keep or reset', 'tf_timeout', z_max='far', decimation=0,
-                           on_time_jump='never', tf_timeout=-1.0)
+        self.check_refused('z_max.*number', 'decimation', 'on_time_jump.*keep or reset', 'tf_timeout', 'cloud_confidence.*frontier or occupied',
+                           z_max='far', decimation=0, on_time_jump='never', tf_timeout=-1.0, cloud_confidence='high')
 
     def test_no_such_device(self):
         self.check_refused('no-such-platform', platform='no-such-platform')

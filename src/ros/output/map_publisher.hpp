@@ -87,6 +87,7 @@ class MapPublisher {
   SurfelUpdate with_header(SurfelUpdate update) const;
 
   const std::string world_frame_;
+  const Label confident_;  ///< has confidence 1 in clouds
   const Clock::duration period_;
   const std::function<void()> wake_;
   std::array<ros::Publisher, kTopics> publishers_;

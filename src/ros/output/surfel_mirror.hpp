@@ -10,8 +10,11 @@
 
 namespace frontier_surfels {
 
-/// As many as a PointCloud2 of 40 bytes a surfel can hold; a higher id can only be a damaged one.
-constexpr std::size_t kMostSurfels = 0xffffffffu / 40;
+/// Size of a surfel in a PointCloud2 [byte].
+constexpr std::size_t kBytesOfSurfel = 48;
+
+/// Maximum number of surfels in a PointCloud2. An id that is not below it must be damaged.
+constexpr std::size_t kMostSurfels = 0xffffffffu / kBytesOfSurfel;
 
 /// Whether there is a surfel in a slot of SurfelMirror.
 inline bool exists(const Surfel& slot) { return slot.radius != 0; }
