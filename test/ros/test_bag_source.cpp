@@ -1,4 +1,4 @@
-/// Bags made by hand: transforms of all kinds, colour, topics, and every fault of a file.
+/// Bags with all kinds of transforms, colour images, topics and damage.
 #include <gtest/gtest.h>
 
 #include <fstream>

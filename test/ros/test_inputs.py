@@ -23,7 +23,7 @@ class Inputs(MapperTest):
         cls.colored.wait_until_connected(cls.camera.color, *cls.camera.raw())
 
     def map_of(self, make_message, mapper=None):
-        """The map of a short walk; `make_message` makes an image of millimetres."""
+        """The map of a short walk. `make_message` makes the message of an image of millimetres."""
         mapper = mapper or self.mapper
         mapper.reset()
         self.camera.new_frame()
@@ -147,7 +147,7 @@ class Inputs(MapperTest):
         self.assertEqual(set(colorless['rgb'][colorless['label'] == 1] & 0xFFFFFF), {0x808080})
 
     def test_confidence(self):
-        """1 for the frontier, or for occupied surfels where ~cloud_confidence says so."""
+        """It is 1 for frontier surfels, or for occupied ones if ~cloud_confidence says so."""
         self.colored.reset()
         header = self.camera.send(0)
         for mapper in (self.mapper, self.colored):

@@ -19,7 +19,7 @@ REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera
 
 class Processes(unittest.TestCase):
     def start(self, name, **parameters):
-        """A mapper as a process of ours."""
+        """Starts a mapper as a process of this test."""
         program = find_node('frontier_surfels', 'mapper_node')[0]
         arguments = [f'__name:={name}', *REMAPPINGS, *(f'_{key}:={value}' for key, value in parameters.items())]
         self.addCleanup(lambda: rospy.has_param(name) and rospy.delete_param(name))
@@ -56,7 +56,7 @@ class Processes(unittest.TestCase):
         self.assertRegex(output, '~decimatoin.*decimation')
 
     def check_ends(self, process):
-        """Ctrl-C, as roslaunch does it."""
+        """The process ends on SIGINT, as roslaunch sends it."""
         start = time.monotonic()
         process.send_signal(signal.SIGINT)
         output = process.communicate(timeout=20)[0]
@@ -71,7 +71,7 @@ class Processes(unittest.TestCase):
         for step in range(4):
             report = mapper.report(camera.send(step))
             self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
-        self.assertGreater(report.total_ms, 30)  # a frame takes its time
+        self.assertGreater(report.total_ms, 30)  # long enough to be interrupted
         camera.send(4)
         camera.send(5)
         time.sleep(0.02)

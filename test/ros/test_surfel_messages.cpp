@@ -1,4 +1,4 @@
-/// Surfels as clouds and back: bit for bit, and nothing from what is damaged.
+/// Surfels are packed into clouds and read again bit for bit, and damaged clouds are refused.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -94,7 +94,7 @@ TEST(SurfelClouds, ShowSurfelsWithoutAColour) {
   EXPECT_EQ(rgb(1), 0x808080U);
   EXPECT_EQ(rgb(2), 0x808080U);
   EXPECT_EQ(rgb(3), 0x0000ffU);
-  EXPECT_TRUE(same(to_surfels(cloud), surfels)) << "colours that are only shown are none";
+  EXPECT_TRUE(same(to_surfels(cloud), surfels)) << "the colours in the cloud are only for show";
 }
 
 TEST(SurfelClouds, AreConfidentOfOneLabel) {
@@ -120,7 +120,7 @@ TEST(SurfelClouds, OfAMapLeaveOutItsGaps) {
     EXPECT_TRUE(same(to_surfels(to_cloud(mirror, Label::kFrontier, label)), mirror.surfels(label)));
 }
 
-/// The fields in another order, with gaps, and in rows with gaps.
+/// Fields in another order and with gaps, and rows with gaps.
 TEST(SurfelClouds, AreReadByTheirFieldsNames) {
   const auto surfels = awkward_surfels();
   const PointCloud2 plain = to_cloud(surfels);
@@ -142,7 +142,7 @@ TEST(SurfelClouds, AreReadByTheirFieldsNames) {
   EXPECT_TRUE(same(to_surfels(cloud), surfels));
 }
 
-/// @return the sentence of the error, empty if there was none
+/// @return the sentence of the error that a damaged cloud causes; empty if it is read
 std::string refusal(const std::function<void(PointCloud2&)>& damage) {
   Rng rng(3);
   PointCloud2 cloud = to_cloud(random_surfels(rng, 10));
@@ -224,7 +224,7 @@ TEST(SerializedMessages, AreNotSerialisedAgain) {
   PointCloud2 back;
   ros::serialization::deserializeMessage(bytes, back);
   EXPECT_EQ(back.data, cloud.data);
-  EXPECT_STREQ(ros::message_traits::md5sum(packed), "*") << "it must fit every topic";
+  EXPECT_STREQ(ros::message_traits::md5sum(packed), "*") << "a serialised message must fit every topic";
 }
 
 TEST(FrameReports, SayWhatTheMapperSays) {
