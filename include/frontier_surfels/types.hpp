@@ -91,6 +91,11 @@ struct Surfel {
   std::uint32_t id = 0;                         ///< stays with the surfel; used again only after its removal was told
 };
 
+/// Where a surfel is asked whether it is right, in radii from its centre: space should be unknown kBackProbe behind it, against the normal,
+/// and known kFrontProbe before it. The mapper makes new surfels so that they are; the exact test of the scores asks.
+constexpr double kBackProbe = 0.25;
+constexpr double kFrontProbe = 1.75;
+
 /// Difference between the map after frame `since` and now.
 struct Changes {
   std::uint64_t sequence = 0;          ///< number of the last frame (or reset, load) contained

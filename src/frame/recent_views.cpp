@@ -59,30 +59,20 @@ Eigen::Matrix3d projection(const Intrinsics& camera) {
   return K;
 }
 
-/// Puts a view into its lane of a group.
+/// Puts a view into its lane of a group: lane[VIEW_LANE_FIELDS][VIEW_GROUP] from its first number on.
 void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, std::uint32_t first_pixel, float* lane) {
-  const Eigen::Matrix3d R = T_view_camera.linear();
-  const Eigen::Vector3d t = T_view_camera.translation();
-  const double fields[VIEW_LANE_FIELDS - 1] = {R(0, 0),
-                                               R(0, 1),
-                                               R(0, 2),
-                                               R(1, 0),
-                                               R(1, 1),
-                                               R(1, 2),
-                                               R(2, 0),
-                                               R(2, 1),
-                                               R(2, 2),
-                                               t.x(),
-                                               t.y(),
-                                               t.z(),
-                                               camera.fx,
-                                               camera.fy,
-                                               camera.cx,
-                                               camera.cy,
-                                               static_cast<double>(camera.width),
-                                               static_cast<double>(camera.height)};
-  for (int n = 0; n < VIEW_LANE_FIELDS - 1; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
-  std::memcpy(&lane[(VIEW_LANE_FIELDS - 1) * LANES], &first_pixel, sizeof(first_pixel));
+  const auto set = [lane](int field, double value) { lane[field * VIEW_GROUP] = static_cast<float>(value); };
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) set(VIEW_LANE_R00 + 3 * row + column, T_view_camera.linear()(row, column));
+    set(VIEW_LANE_T0 + row, T_view_camera.translation()[row]);
+  }
+  set(VIEW_LANE_FX, camera.fx);
+  set(VIEW_LANE_FY, camera.fy);
+  set(VIEW_LANE_CX, camera.cx);
+  set(VIEW_LANE_CY, camera.cy);
+  set(VIEW_LANE_WIDTH, camera.width);
+  set(VIEW_LANE_HEIGHT, camera.height);
+  std::memcpy(&lane[VIEW_LANE_FIRST_PIXEL * VIEW_GROUP], &first_pixel, sizeof(first_pixel));
 }
 
 /// The kept views in an order in which each is far from those before it: what is still unknown after a few is unknown to most, and what is
@@ -125,21 +115,28 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
   // The patches of the next room must not lie across lines of the cache; and pixels are read two at a time.
   depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
-  if (depths.size() > room_size_) {
-    const double pixels = static_cast<double>(config_.recent_views + 1) * static_cast<double>(depths.size());
-    if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
-      throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
-                     " billion pixels, more than 2; raise decimation or lower recent_views.");
-    // A larger image than ever before: the kept ones are few and soon replaced.
-    clear(kept_.empty() && complete_);
-    depths_.allocate((config_.recent_views + 1) * depths.size());
-    room_size_ = depths.size();
-  }
+  if (depths.size() > room_size_) enlarge_rooms(depths.size());
+  current_ = {image.intrinsics, T_world_camera, free_room()};
+  depths_.send(std::move(depths), current_.room * room_size_);
+}
+
+/// The kept views move along with their rooms.
+void RecentViews::enlarge_rooms(std::size_t size) {
+  const std::size_t rooms = config_.recent_views + 1;
+  const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
+  if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
+    throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
+                   " billion pixels, more than 2; raise decimation or lower recent_views.");
+  std::size_t used = 0;
+  for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);
+  depths_.widen_rows(rooms, used, room_size_, size);
+  room_size_ = size;
+}
+
+std::size_t RecentViews::free_room() const {
   std::vector<bool> taken(config_.recent_views + 1, false);
   for (const Kept& kept : kept_) taken[kept.room] = true;
-  const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
-  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.send(std::move(depths), room * room_size_);
+  return static_cast<std::size_t>(std::find(taken.begin(), taken.end(), false) - taken.begin());
 }
 
 View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
@@ -156,13 +153,13 @@ View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d:
 
 int RecentViews::prepare() {
   std::vector<View> views;
-  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * LANES, 0.0F);
+  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * VIEW_GROUP, 0.0F);
   for (const std::size_t number : spread(kept_.size())) {
     const Kept& kept = kept_[number];
     const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
     const std::size_t n = views.size();
     views.push_back(to_view(kept, T_view_camera));
-    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
+    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / VIEW_GROUP * VIEW_LANE_FIELDS * VIEW_GROUP + n % VIEW_GROUP]);
   }
   views_.send(std::move(views));
   view_lanes_.send(std::move(lanes));
@@ -172,6 +169,7 @@ int RecentViews::prepare() {
 bool RecentViews::adds_something() const {
   const double cos_angle = std::cos(config_.recent_view_angle * M_PI / 180);
   return std::none_of(kept_.begin(), kept_.end(), [&](const Kept& kept) {
+    if (!same_camera(kept.intrinsics, current_.intrinsics)) return false;
     const Eigen::Isometry3d motion = kept.T_world_camera.inverse() * current_.T_world_camera;
     const double cos_turn = (motion.linear().trace() - 1) / 2;
     return motion.translation().norm() < config_.recent_view_distance && cos_turn > cos_angle;

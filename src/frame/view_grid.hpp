@@ -15,12 +15,12 @@ namespace frontier_surfels {
 using PixelRange = std::array<std::uint16_t, 2>;
 
 /// pixels: of the working image, those whose samples of the cuboid's layers lie in each voxel along an axis; empty where there are none.
-/// Layers are filled up to whole words of the bit fields, and voxels to whole chunks of LANES.
+/// Layers are filled up to whole words of the bit fields, and voxels to whole chunks of TABLE_CHUNK.
 struct ViewGrid {
   Grid grid = {};
   std::vector<float> layer_depth;    ///< [size_k]: z of each layer's centre [m]
-  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][LANES]: columns
-  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][LANES]: rows
+  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][TABLE_CHUNK]: columns
+  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][TABLE_CHUNK]: rows
   std::vector<PixelRange> words_i;   ///< [layers][chunks]: words of 32 pixels that the columns of a chunk lie in
 };
 

@@ -89,7 +89,8 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
     p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
   const auto x = p.col(0), y = p.col(1), z = p.col(2);
   const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
-  constexpr double kRounded = 1.001, kMore = 1.6;  // radii are kept with 11 bits; [voxel], a tenth of it for rounding in the kernel
+  constexpr double kRounded = 1.001,
+                   kMore = REACH_MARGIN + 0.1;  // radii are kept with 11 bits; [voxel], a tenth for rounding in the kernel
   const double reach = std::max(2 * kRounded * extent_.largest_radius / voxel_low, extent_.thickness) + kMore;  // [voxel]
   if (z.maxCoeff() < -(grid_.padding_k + reach) * grid_.delta_min) return false;
   // Surfels reach the further, the deeper they are, but not as fast as depth grows.

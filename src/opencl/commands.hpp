@@ -13,6 +13,9 @@
 
 namespace frontier_surfels {
 
+/// Options that the kernels are built with for a device.
+std::string build_options(const Device& device);
+
 /// Builds all kernels once; launches them by name and notes their times.
 class Commands {
  public:
@@ -22,6 +25,8 @@ class Commands {
   Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
+  std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< that a work item handles
+  std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< of LANES that `count` entries make
   cl::CommandQueue& queue() { return queue_; }
 
   /// Launches a kernel over at least `items` work items, in groups of `group`, and counts its time to `stage`.
@@ -90,6 +95,17 @@ class DeviceArray {
     commands_->release(capacity_ * sizeof(T));
     buffer_ = bigger;
     capacity_ = larger;
+  }
+
+  /// Replaces rows of `old_width` elements by `rows` of `width`, nothing to spare. The first `kept` rows keep what they hold.
+  void widen_rows(std::size_t rows, std::size_t kept, std::size_t old_width, std::size_t width) {
+    const cl::Buffer bigger = commands_->allocate(rows * width * sizeof(T));
+    if (kept > 0 && old_width > 0)
+      commands_->queue().enqueueCopyBufferRect(buffer_, bigger, {0, 0, 0}, {0, 0, 0}, {old_width * sizeof(T), kept, 1},
+                                               old_width * sizeof(T), 0, width * sizeof(T), 0);
+    commands_->release(bytes());
+    buffer_ = bigger;
+    capacity_ = rows * width;
   }
 
   void write(const std::vector<T>& values, std::size_t offset = 0) {

@@ -1,4 +1,4 @@
-/// Frames that are written to a bag and read again.
+/// Frames that sequence_to_bag has written are read back as they were.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace frontier_surfels::replay {
 namespace {
 
-/// A source of frames in memory.
+/// Frames of the synthetic room, kept in memory.
 class RoomSource : public FrameSource {
  public:
   explicit RoomSource(std::vector<RecordedFrame> frames) : frames_(std::move(frames)) {}
@@ -79,7 +79,7 @@ TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   }
 }
 
-/// The mapper computes float(mm) / 1000. Maps are equal bit for bit only if the bag has exactly these floats.
+/// The mapper computes float(mm) / 1000. Maps are the same bit for bit only if the bag contains exactly these floats.
 TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
   const std::vector<RecordedFrame> written = room_frames(), read = write_and_read({});
   ASSERT_EQ(read.size(), written.size());

@@ -51,53 +51,6 @@ class Poses(MapperTest):
         self.assertEqual(self.mapper.map()[0], report.sequence)
         self.map_walk(1, first=3)
 
-    def test_images_do_not_wait_for_one_without_pose(self):
-        """Later images are mapped before it is dropped."""
-        lost = self.camera.frame
-        header_lost = self.camera.send(0, send_pose=False)
-        self.camera.new_frame()
-        self.assertNotEqual(lost, self.camera.frame)
-        self.map_walk(3)
-        self.assertEqual([report.result for report in self.mapper.reports if report.header.frame_id == lost], [])
-        self.check_dropped(header_lost, NO_POSE, lost)
-
-    def test_pose_that_comes_after_a_later_image_was_mapped(self):
-        frame = self.camera.frame
-        header = self.camera.send(0, send_pose=False)
-        self.camera.new_frame()
-        self.map_walk(1, first=1)
-        self.camera.send_pose(pose(0), header.stamp, child=frame)
-        self.check_dropped(header, FrameReport.DROPPED_OUT_OF_ORDER, 'order')
-
-    def test_pause_while_an_image_waits(self):
-        header = self.camera.send(0, send_pose=False)
-        self.wait_for_arrival()
-        self.addCleanup(self.mapper.pause, False)
-        self.assertTrue(self.mapper.pause(True).success)
-        self.camera.send_pose(pose(0), header.stamp)
-        self.check_dropped(header, FrameReport.DROPPED_PAUSED, 'paused')
-        self.mapper.pause(False)
-        self.map_walk(1, first=1)
-
-    def test_reset_while_an_image_waits(self):
-        """The image was taken before the reset, so that it is not mapped afterwards."""
-        self.map_walk(1)
-        header = self.camera.send(1, send_pose=False)
-        self.wait_for_arrival()
-        self.assertTrue(self.mapper.reset().success)
-        self.camera.send_pose(pose(1), header.stamp)
-        self.check_dropped(header, FrameReport.DROPPED_QUEUE, 'reset')
-        self.assertEqual(len(self.mapper.surfels()), 0)
-        self.map_walk(1, first=2)
-
-    def wait_for_arrival(self):
-        """Waits until everything that was sent so far has reached the mapper. A damaged image follows, as images arrive in order."""
-        frame = self.camera.frame
-        self.camera.new_frame()
-        empty = raw_image(self.camera.camera.depth(0), '', None)
-        self.check_dropped(self.camera.send(0, send_pose=False, message=empty), FrameReport.DROPPED_BAD_IMAGE, 'encoding')
-        self.camera.frame = frame
-
     def test_missing_link_of_a_chain(self):
         header = header_of(self.camera.frame)
         base = self.camera.frame + '_base'

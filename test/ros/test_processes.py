@@ -71,10 +71,9 @@ class Processes(unittest.TestCase):
         for step in range(4):
             report = mapper.report(camera.send(step))
             self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
-        self.assertGreater(report.total_ms, 30)  # long enough to be interrupted
         camera.send(4)
         camera.send(5)
-        time.sleep(0.02)
+        time.sleep(report.total_ms / 1000)  # about half of the time that the two take
         self.check_ends(process)
 
     def test_ends_while_a_frame_waits_for_its_pose(self):

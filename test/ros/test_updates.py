@@ -12,7 +12,7 @@ import zlib
 import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from frontier_surfels.msg import SurfelUpdate
+from frontier_surfels.msg import FrameReport, SurfelUpdate
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -209,8 +209,10 @@ class Updates(MapperTest):
 
         subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, receive)
         self.addCleanup(subscriber.unregister)
-        self.camera.send(0, send_pose=False)
+        header = self.camera.send(0, send_pose=False)
         report = self.map_walk(2)
+        self.check_dropped(header, FrameReport.DROPPED_NO_POSE, '.')
+        received.clear()  # diagnostics from before the image was dropped
 
         def mapping():
             values = [{entry.key: entry.value for entry in status.values} for status in received if status.level == 0]
