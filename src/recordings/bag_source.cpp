@@ -141,7 +141,7 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   RecordedFrame frame;
   frame.stamp = header.stamp.toSec();
   frame.T_world_camera = transforms_.T_world_frame(world_, strip_slash(header.frame_id), header.stamp);
-  frame.depth = messages::depth_image(image);
+  frame.depth = messages::copy(messages::depth_pixels(image).view);
   frame.intrinsics = intrinsics_at(header.stamp, frame.depth.size());
   if (color_images_) frame.color = color_at(header.stamp, frame.depth.size());
   return frame;
@@ -164,8 +164,8 @@ cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) 
       note_once("Some depth images have no image on " + topics_.color + " within 30 ms" + without);
       return {};
     }
-    const cv::Mat color = messages::color_image(image);
-    if (color.size() == depth_size) return color;
+    const messages::Pixels<ColorImage> color = messages::color_pixels(image);
+    if (cv::Size(color.view.width, color.view.height) == depth_size) return messages::copy(color.view);
     note_once("Some images on " + topics_.color + " have another size than the depth image" + without);
   } catch (const std::runtime_error& fault) {  // BadFrame, or rosbag's
     note_once("Some images on " + topics_.color + " cannot be read (" + fault.what() + ")" + without);

@@ -47,16 +47,21 @@ std::vector<std::string> names_of(const std::vector<ImageTopic>& topics) {
   return names;
 }
 
+template <typename View>
+cv::Size size_of(const View& image) {
+  return cv::Size(image.width, image.height);
+}
+
 /// What an image message shows; empty if it cannot be used.
 std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& message) {
   if (!message) return std::nullopt;
   const bool compressed = static_cast<bool>(message.compressed);
   try {
-    return ImageTopic{name, compressed, true, messages::depth_image(message).size()};
+    return ImageTopic{name, compressed, true, size_of(messages::depth_pixels(message).view)};
   } catch (const BadFrame&) {  // no depth image, but perhaps a colour image
   }
   try {
-    return ImageTopic{name, compressed, false, messages::color_image(message).size()};
+    return ImageTopic{name, compressed, false, size_of(messages::color_pixels(message).view)};
   } catch (const BadFrame&) {
     return std::nullopt;
   }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "frontier_surfels/replay/recorded_frame.hpp"
+#include "recordings/recorded_frame.hpp"
 
 namespace frontier_surfels::replay {
 

@@ -128,7 +128,7 @@ TEST_F(BagStreams, TheColourNearestOfAllIsAlwaysAmongThoseSent) {
     };
     for (const double frame : frames) {
       const Stamps more = take(stream, frame);
-      EXPECT_LE(more.size(), 2u) << "a mapper's queue holds no more";
+      EXPECT_LE(more.size(), 2u) << "a mapper's queue is short";
       sent.insert(sent.end(), more.begin(), more.end());
       EXPECT_EQ(nearest(sent, frame), nearest(colors, frame)) << "seed " << seed << ", frame at " << frame;
     }
