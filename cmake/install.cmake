@@ -8,8 +8,7 @@ set_target_properties(frontier_surfels frontier_surfels_scoring PROPERTIES INSTA
 install(TARGETS frontier_surfels frontier_surfels_scoring EXPORT frontier_surfelsTargets
   LIBRARY DESTINATION ${INSTALL_LIBRARIES_TO})
 install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
-install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO}
-  PATTERN replay EXCLUDE)  # belongs to the programs
+install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO})
 if(FRONTIER_SURFELS_WITH_ROS)
   set_target_properties(mapper_node PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
   set_target_properties(frontier_surfels_ros PROPERTIES INSTALL_RPATH "$ORIGIN")

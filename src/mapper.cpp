@@ -1,14 +1,25 @@
 #include "frontier_surfels/mapper.hpp"
 
 #include <chrono>
+#include <optional>
 #include <utility>
 
+#include "frame/camera.hpp"
+#include "frame/limits.hpp"
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/ply.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
-#include "stages/stages.hpp"
+#include "stages/candidates.hpp"
+#include "stages/creation.hpp"
+#include "stages/known_space.hpp"
+#include "stages/observed_space.hpp"
+#include "stages/removal.hpp"
+#include "stages/surfel_split.hpp"
+#include "stages/surfel_visit.hpp"
+#include "stages/thin_gaps.hpp"
+#include "stages/view_settling.hpp"
 #include "storage/map_archive.hpp"
 
 namespace frontier_surfels {
@@ -37,34 +48,57 @@ auto on_device(Work work) -> decltype(work()) {
 }  // namespace
 
 struct Mapper::Impl {
-  Report integrate(const DepthFrame& frame);
-  void finish_frame();
-  void fetch_blocks(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame);
-  void begin_map(const std::vector<Surfel>& surfels);
-  std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
-
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
+        limits(make_limits(config)),
         commands(choose_device(config)),
         lists(commands),
         map(commands, lists, config),
         views(commands, config),
-        stages(commands, lists, config, map, views) {
+        cameras(commands, config),
+        observed(commands),
+        candidates(commands),
+        visit(commands),
+        splitting(commands, lists),
+        settling(commands),
+        list(commands, lists),
+        creation(commands, lists) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map);
     views.clear(archive->empty());
   }
 
-  Config config;
+  Report integrate(const DepthFrame& input);
+  Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
+  SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
+  void finish_pages(std::uint32_t number);
+  void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
+  void finish_frame(Report& report);
+  void begin_map(const std::vector<Surfel>& surfels);
+  std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
+
+  const Config config;
+  const Limits limits;
   Commands commands;
   Lists lists;
   SurfelMap map;
   RecentViews views;
-  Stages stages;
+  Cameras cameras;
+
+  // The stages, in the order in which they run
+  ObservedSpace observed;
+  Candidates candidates;
+  SurfelVisit visit;
+  SurfelSplit splitting;
+  ViewSettling settling;
+  CandidateList list;
+  std::optional<KnownSpace> known_space;  ///< from the first frame on that needs it
+  Creation creation;
+
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
-  bool unfinished = false;            ///< the last frame failed
+  std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of the last one if it failed half way; 0: none
   bool pages_changed = false;         ///< since the last finished frame: by one that failed, or by the archive
 };
 
@@ -77,82 +111,108 @@ Report Mapper::integrate(const DepthFrame& frame) {
   return on_device([&] { return impl_->integrate(frame); });
 }
 
-Report Mapper::Impl::integrate(const DepthFrame& frame) {
+Report Mapper::Impl::integrate(const DepthFrame& input) {
   const auto start = Clock::now();
-  commands.forget_times();  // of a frame that failed half way
   Report report;
-  report.stamp = frame.stamp;
+  report.stamp = input.stamp;
   report.sequence = sequence + 1;
-
-  // The working image and its grid - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(frame, config);
-  frame_on_device = 0;
-  if (unfinished) {  // a frame failed half way, but may have split surfels or noted others as changed
-    pages_changed = true;
-    finish_frame();
-    unfinished = false;
-  }
   const auto number = static_cast<std::uint32_t>(report.sequence);
-  if (archive) fetch_blocks(image, frame.T_world_camera, number);
-  unfinished = true;
-  stages.begin_frame(image, frame.T_world_camera, number);
+
+  // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
+  const WorkingImage image = make_working_image(input, config);
+  Camera& camera = cameras.find(image.intrinsics);
+  const Frame frame = begin_frame(image, input.T_world_camera, camera, number);
 
   // Observed space C~ - 3.3, eq. (9)-(11)
-  stages.observe_space();
+  observed.compute(frame, camera);
 
-  // Candidates for creation - 3.5, eq. (13)
-  stages.find_candidates();
+  // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
+  // surviving surfel needs no new one
+  SurfelVisit::Found found = visit_surfels(frame, camera);
+  report.in_view = found.in_view;
 
-  // Surfels in view, split where they are large for this view - 3.4 -, and removal - eq. (12): decided now, done when the frame can no
-  // longer fail. Voxels of surfels that stay are no candidates
-  report.in_view = stages.select_in_view();
-  report.split = stages.split_surfels();
-
-  // Candidates that a recent view knows are none
-  stages.settle_by_recent_views();
-
-  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8). What no view saw is unknown where all are
-  // kept
-  if (stages.is_open()) {
-    stages.compute_sign_field();
-    stages.compute_known_hull();
-    stages.sweep_paths();
-    stages.filter_median();
+  // Surfels that are large for this view are split - 3.4; their children are visited in their place
+  if (found.large > 0) {
+    report.split = splitting.split(frame, visit.large(), map);
+    found = visit_surfels(frame, camera);
   }
-  stages.filter_candidates();
 
-  // Psi_(n+1) = survivors u created - eq. (14)-(16)
-  report.removed = stages.remove_surfels();
-  report.created = stages.create_surfels();
+  // Candidates that a kept view knows are settled - ours -, and so are those on thin sheets of unknown
+  settling.settle(frame, camera, views, candidates);
+  list.list(frame, camera, observed.bits(), candidates);
+  close_thin_gaps(commands, frame, camera, observed.column_end(), views, settling.tile_views(), list, candidates);
+
+  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8). While all views are kept they know all
+  const BitField* known = nullptr;
+  if (!views.complete()) {
+    if (!known_space) known_space.emplace(commands, lists);
+    known = &known_space->compute(frame, visit.in_view(), candidates, map);
+  }
+
+  // New surfel filter - 3.5. Up to here the frame may fail; device memory for what follows is made sure of
+  report.created = creation.filter(frame, list, candidates, known);
+  map.reserve(report.created);
+
+  // Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16)
+  remove_surfels(commands, visit.removed(), found.removed, map);
+  report.removed = found.removed;
+  creation.create(frame, camera, views, settling.tile_views(), list, map);
 
   // Labels and colour - 3.5
-  stages.label_surfels();
-  finish_frame();
+  label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  if (archive) archive->save_some(number);
+  finish_frame(report);
+  report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  return report;
+}
+
+Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
+  commands.forget_times();  // of a frame that failed half way
+  frame_on_device = 0;
+  if (unfinished != 0) {  // it may have split surfels, or noted others as changed
+    pages_changed = true;
+    finish_pages(unfinished);
+    unfinished = 0;
+  }
+  if (archive) fetch_blocks(camera, T_world_camera, number);
+  map.open_window(camera.grid(), T_world_camera);
+  unfinished = number;
+  camera.set_image(image);
+  views.set_current(image, T_world_camera);
+  return make_frame(camera, map.window(), views, limits);
+}
+
+/// Finds the candidates and goes through the surfels, which take their voxels off them.
+SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera& camera) {
+  candidates.find(frame, observed.bits(), visit.counters());
+  return visit.visit(frame, camera, observed.bits(), observed.column_end(), views, map, candidates);
+}
+
+void Mapper::Impl::finish_pages(std::uint32_t number) {
+  const std::vector<BlockKey> shrunk = map.finish_frame("labels", number);
+  if (archive) archive->note_shrunk(shrunk);
+}
+
+/// Once more if surfels have come that are larger than any before: they matter to a wider window.
+void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number) {
+  bool changed = std::exchange(pages_changed, true);  // whatever fails
+  const auto reach = [&] { return map.window_reach(camera.grid(), T_world_camera) + KnownHull::kReach * config.z_max; };
+  while (archive->follow(T_world_camera.translation(), reach(), number)) changed = true;
+  pages_changed = changed;
+}
+
+void Mapper::Impl::finish_frame(Report& report) {
+  finish_pages(unfinished);
+  if (archive) archive->save_some(unfinished);
   report.view_kept = views.keep_current();
   report.stages = commands.take_times();
-  unfinished = false;
+  unfinished = 0;
   sequence = report.sequence;
   frame_on_device = pages_changed ? 0 : sequence;
   pages_changed = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.device_bytes = device_bytes();
-  report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-  return report;
-}
-
-void Mapper::Impl::finish_frame() {
-  const std::vector<BlockKey> shrunk = stages.finish_frame();
-  if (archive) archive->note_shrunk(shrunk);
-}
-
-/// Once more if surfels have come that are larger than any before: they matter to a wider window.
-void Mapper::Impl::fetch_blocks(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint32_t frame) {
-  bool changed = std::exchange(pages_changed, true);  // whatever fails
-  while (archive->follow(T_world_camera.translation(), stages.set_camera(image, T_world_camera), frame)) changed = true;
-  pages_changed = changed;
 }
 
 std::vector<Surfel> Mapper::surfels() const {

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "map/map_window.hpp"
+#include "stages/frame_fixture.hpp"
 #include "stages/reference_surfels.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -48,18 +48,18 @@ struct Tally {
 };
 
 /// @param largest  radius that surfels of the map have [m]; 0: what this view's own may have
-void check(const Camera& camera, const Eigen::Isometry3d& T_world_camera, double largest, Random& random, Tally& tally) {
+void check(const CameraSetup& camera, const Eigen::Isometry3d& T_world_camera, double largest, Random& random, Tally& tally) {
   const Nuvg grid(camera.intrinsics, camera.config);
-  StagesProbe probe(camera.config);
+  FrameFixture fixture(camera.config);
   if (largest > 0) {
     Surfel surfel;
     surfel.radius = static_cast<float>(largest);
-    probe.map().replace({surfel}, 1);
+    fixture.map().replace({surfel}, 1);
   } else {
     largest = std::sqrt(3.0) / 2 * grid.voxel_size(grid.from_grid(Vector3d(0, 0, grid.size_k - 1)).z());
   }
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 1);
-  const MapWindow& window = probe.map().window();
+  fixture.begin(random_image(camera, Content::all_invalid, random), T_world_camera);
+  const MapWindow& window = fixture.map().window();
   const Window& w = window.window();
   const double block_size = block_size_for(camera.config.z_max);
   EXPECT_EQ(w.block_size, block_size);
@@ -93,11 +93,11 @@ void check(const Camera& camera, const Eigen::Isometry3d& T_world_camera, double
 TEST(MapWindow, HasEveryBlockThatReachesIntoTheGrid) {
   Tally tally;
   Random random(1);
-  std::vector<Camera> all = cameras();
+  std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(200, 100, 130, 130, 200));  // a wide cuboid before the pyramid, and fine voxels
   all.back().config.z_min = 1.8;
   all.back().config.z_max = 3;
-  for (const Camera& camera : all)
+  for (const CameraSetup& camera : all)
     for (const double largest : {0.0, 0.05, 0.4})
       for (int n = 0; n < 5; ++n) {
         SCOPED_TRACE(camera.name + ", radius " + std::to_string(largest) + " m");
@@ -111,18 +111,18 @@ TEST(MapWindow, HasEveryBlockThatReachesIntoTheGrid) {
 
 /// Only rotations and translations that floats hold: the local frame and its pose are then the same to the last bit.
 TEST(MapWindow, IsTheSameAnywhere) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   Random random(2);
   Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
   here.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   here.translation() = Vector3d(0.3125, -7.75, 1.125);
-  StagesProbe probe(camera.config);
+  FrameFixture fixture(camera.config);
   const WorkingImage image = random_image(camera, Content::all_invalid, random);
-  probe.stages().begin_frame(image, here, 1);
-  const MapWindow first = probe.map().window();
+  fixture.begin(image, here);
+  const MapWindow first = fixture.map().window();
   for (const Vector3d& shift : {Vector3d(4096, -8192, 512), Vector3d(-50000, 49999.5, 3)}) {
-    probe.stages().begin_frame(image, Eigen::Translation3d(shift) * here, 2);
-    const MapWindow& window = probe.map().window();
+    fixture.begin(image, Eigen::Translation3d(shift) * here);
+    const MapWindow& window = fixture.map().window();
     EXPECT_TRUE(window.T_camera_local().matrix() == first.T_camera_local().matrix());
     ASSERT_EQ(window.cells(), first.cells());
     for (int cell = 0; cell < first.cells(); ++cell) {
@@ -137,10 +137,10 @@ TEST(MapWindow, IsTheSameAnywhere) {
 /// What a frame works on must not depend on which of the two ways finds it.
 TEST(MapWindow, BlocksNearAreThoseThatAreNear) {
   Random random(3);
-  const Camera camera = cameras().front();
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), random.pose(100, 3.1), 1);
-  const MapWindow& window = probe.map().window();
+  const CameraSetup camera = cameras().front();
+  FrameFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), random.pose(100, 3.1));
+  const MapWindow& window = fixture.map().window();
   const Window& w = window.window();
   for (const double distance : {0.0, 0.2, 0.5, 2.9, 3.0, 3.1}) {
     std::set<BlockKey> near;

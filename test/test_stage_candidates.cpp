@@ -2,34 +2,39 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/frame_fixture.hpp"
 #include "stages/reference_paths.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 using namespace reference;
 
-void check(const Camera& camera, double observed_density) {
+void check(const CameraSetup& camera, double observed_density) {
   SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
   Random random(5);
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  const Field<char> observed = random_field(probe.grid(), observed_density, random);
-  probe.set_observed(observed);
-  probe.stages().find_candidates();
-  expect_equal("candidates", candidates(observed), probe.candidates());
+  FrameFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  const Field<char> observed = random_field(fixture.grid(), observed_density, random);
+  BitField observed_bits(fixture.commands());
+  fixture.write(observed_bits, observed);
+  DeviceArray<cl_uint> counters(fixture.commands());
+  counters.write({1, 2, 3});
+  Candidates found(fixture.commands());
+  found.find(fixture.frame(), observed_bits, counters);
+  expect_equal("candidates", candidates(observed), fixture.read(found));
+  EXPECT_EQ(counters.read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the counters of the next stage";
 }
 
 TEST(StageCandidates, RandomFields) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     check(camera, 0.02);
     check(camera, 0.3);
   }
 }
 
 TEST(StageCandidates, EmptyAndFullFields) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     check(camera, 0);
     check(camera, 1);
     check(camera, 0.5);

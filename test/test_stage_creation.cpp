@@ -5,80 +5,116 @@
 #include <map>
 #include <set>
 
+#include "stages/creation.hpp"
+#include "stages/frame_fixture.hpp"
 #include "stages/reference_observed_space.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/reference_views.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/view_settling.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 using namespace reference;
 
+/// What creation needs of other stages, as data, and the stage itself.
+struct CreationFixture : FrameFixture {
+  explicit CreationFixture(const Config& config)
+      : FrameFixture(config),
+        observed(commands()),
+        known(commands()),
+        candidates(commands()),
+        list(commands(), lists()),
+        settling(commands()),
+        creation(commands(), lists()) {}
+
+  /// Lists the candidates and filters them. @param with_known  looks at K~
+  void filter(bool with_known = true) {
+    list.list(frame(), camera(), observed, candidates);
+    creation.filter(frame(), list, candidates, with_known ? &known : nullptr);
+  }
+
+  /// Voxels of the new surfels, 64 word + bit each.
+  std::vector<std::uint32_t> created_voxels() const {
+    const std::vector<std::uint32_t> listed = list.voxels().read(list.count());
+    std::vector<std::uint32_t> voxels;
+    for (const std::uint32_t number : creation.chosen().read(creation.count())) voxels.push_back(listed[number]);
+    return voxels;
+  }
+  Bits created() const {
+    std::vector<std::uint64_t> words(Candidates::words(grid()), 0);
+    for (const std::uint32_t voxel : created_voxels()) words[voxel / 64] |= std::uint64_t{1} << voxel % 64;
+    return read_tile_words(words);
+  }
+
+  BitField observed, known;
+  Candidates candidates;
+  CandidateList list;
+  ViewSettling settling;
+  Creation creation;
+};
+
 /// @param all_views  no view has been forgotten: K~ has not been computed, and is not looked at
-void check_filter(const Camera& camera, double observed_density, double known_density, bool all_views = false) {
+void check_filter(const CameraSetup& camera, double observed_density, double known_density, bool all_views = false) {
   SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
   Random random(1);
   const Nuvg grid(camera.intrinsics, camera.config);
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  const Field<char> observed = random_field(probe.grid(), observed_density, random);
-  const Field<char> known = random_field(probe.grid(), known_density, random);
-  Field<char> candidates = random_field(probe.grid(), 0.5, random);
+  CreationFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  const Field<char> observed = random_field(fixture.grid(), observed_density, random);
+  const Field<char> known = random_field(fixture.grid(), known_density, random);
+  Field<char> candidates = random_field(fixture.grid(), 0.5, random);
   for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
-  probe.set_observed(observed);
-  probe.set_filtered(known);
-  probe.set_candidates(candidates);
-  if (all_views) probe.views().clear(true);
-  probe.list_candidates();
-  probe.stages().filter_candidates();
+  fixture.write(fixture.observed, observed);
+  fixture.write(fixture.known, known);
+  fixture.write(fixture.candidates, candidates);
+  fixture.filter(!all_views);
   Field<Truth> expected = grid.field(Truth::no);
   for_each_voxel(candidates, [&](int i, int j, int k) {
     if (!candidates(i, j, k) || (known(i, j, k) && !all_views)) return;
     expected(i, j, k) = !less(sum_of_directions(grid, observed, Vector3i(i, j, k)).norm(), 0.01, 1e-4);
   });
-  expect_equal("candidates left", expected, probe.created());
-  const std::vector<std::uint32_t> voxels = probe.created_voxels();
+  expect_equal("candidates left", expected, fixture.created());
+  const std::vector<std::uint32_t> voxels = fixture.created_voxels();
   EXPECT_TRUE(std::is_sorted(voxels.begin(), voxels.end()));
 }
 
 TEST(StageCreation, FilterOfRandomCandidates) {
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const double density : {0.03, 0.5}) check_filter(camera, density, 0.3);
 }
 
 TEST(StageCreation, FilterWithNothingObservedOrAllKnown) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   check_filter(camera, 0, 0);
   check_filter(camera, 0.5, 0);
   check_filter(camera, 0.5, 1);
 }
 
 TEST(StageCreation, FilterWhileNoViewIsForgotten) {
-  for (const Camera& camera : cameras()) check_filter(camera, 0.3, 0.5, true);
+  for (const CameraSetup& camera : cameras()) check_filter(camera, 0.3, 0.5, true);
 }
 
 /// Two observed voxels on opposite sides cancel; a third one decides.
 TEST(StageCreation, OppositeDirectionsMakeNoSurfel) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   Random random(1);
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  Field<char> observed(probe.grid(), 0), candidates(probe.grid(), 0);
+  CreationFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  Field<char> observed(fixture.grid(), 0), candidates(fixture.grid(), 0);
   observed(3, 4, 5) = observed(5, 4, 5) = 1;  // in the cuboid, where opposite directions cancel exactly
   observed(9, 4, 5) = observed(11, 4, 5) = observed(10, 5, 5) = 1;
   candidates(4, 4, 5) = candidates(10, 4, 5) = 1;
-  probe.set_observed(observed);
-  probe.set_filtered(Field<char>(probe.grid(), 0));
-  probe.set_candidates(candidates);
-  probe.list_candidates();
-  probe.stages().filter_candidates();
+  fixture.write(fixture.observed, observed);
+  fixture.write(fixture.known, Field<char>(fixture.grid(), 0));
+  fixture.write(fixture.candidates, candidates);
+  fixture.filter();
   candidates(4, 4, 5) = 0;
-  expect_equal("candidates left", candidates, probe.created());
+  expect_equal("candidates left", candidates, fixture.created());
 }
 
 struct Scene {
-  Camera camera;
+  CameraSetup camera;
   Nuvg grid;
   std::vector<SeenView> kept;
   SeenView current;
@@ -151,32 +187,28 @@ double check_place(const Scene& scene, const Vector3i& v, const Vector3d& normal
   return moved.norm() / size;
 }
 
-Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& random) {
+Scene prepare(const CameraSetup& camera, CreationFixture& fixture, double density, Random& random) {
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
   const double depth_step = depth_step_for(camera.config.z_max);
   for (int frame = 0; frame < 3; ++frame) {
     scene.kept.push_back({random_image(camera, Content::mixed, random), T_world_start * random.pose(0.3, 0.4), depth_step});
-    probe.views().set_current(scene.kept.back().image, scene.kept.back().T_world_camera);
-    EXPECT_TRUE(probe.views().keep_current());
+    fixture.views().set_current(scene.kept.back().image, scene.kept.back().T_world_camera);
+    EXPECT_TRUE(fixture.views().keep_current());
   }
   scene.current = {random_image(camera, Content::all_valid, random), T_world_start, depth_step};
-  probe.stages().begin_frame(scene.current.image, T_world_start, 5);
-  scene.observed = random_field(probe.grid(), 0.2, random);
-  probe.stages().find_candidates();
-  probe.stages().select_in_view();
-  probe.stages().split_surfels();
-  Field<char> candidates = random_field(probe.grid(), density, random);
+  fixture.begin(scene.current.image, T_world_start);
+  scene.observed = random_field(fixture.grid(), 0.2, random);
+  Field<char> candidates = random_field(fixture.grid(), density, random);
   for_each_voxel(candidates, [&](int i, int j, int k) {
     if (scene.observed(i, j, k) || sum_of_directions(scene.grid, scene.observed, Vector3i(i, j, k)).norm() < 0.05) candidates(i, j, k) = 0;
   });
-  probe.set_observed(scene.observed);
-  probe.set_candidates(candidates);
-  probe.stages().settle_by_recent_views();
-  probe.set_filtered(Field<char>(probe.grid(), 0));
-  probe.stages().filter_candidates();
-  candidates = probe.created();
-  probe.set_removed_words(std::vector<std::uint64_t>(probe.window_pages().size(), 0));
+  fixture.write(fixture.observed, scene.observed);
+  fixture.write(fixture.candidates, candidates);
+  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.candidates);
+  fixture.write(fixture.known, Field<char>(fixture.grid(), 0));
+  fixture.filter();
+  candidates = fixture.created();
   const int words_k = (scene.grid.size_k + 63) / 64;
   for (int tile_j = 0; tile_j < scene.grid.size_j; tile_j += VIEW_TILE)
     for (int w = 0; w < words_k; ++w)
@@ -189,29 +221,31 @@ Scene prepare(const Camera& camera, StagesProbe& probe, double density, Random& 
 }
 
 /// @return how many of the new surfels were moved
-std::size_t check_creation(Camera camera, int old_surfels, double density, bool refine = true) {
+std::size_t check_creation(CameraSetup camera, int old_surfels, double density, bool refine = true) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(old_surfels) + " old surfels, density " + std::to_string(density));
   camera.config.refine_surfels = refine;
   Random random(2);
-  StagesProbe probe(camera.config);
+  CreationFixture fixture(camera.config);
   const Nuvg grid(camera.intrinsics, camera.config);
-  probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), old_surfels, 2, 2, random), 1);
-  if (old_surfels > 10) probe.kill(some_slots(probe.map().download(), 7));
-  const Scene scene = prepare(camera, probe, density, random);
-  EXPECT_EQ(probe.stages().remove_surfels(), 0u);
-  const std::vector<Surfel> there = probe.map().download();
-  const std::size_t before = probe.map().size();
+  fixture.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), old_surfels, 2, 2, random), 1);
+  if (old_surfels > 10) fixture.access().kill(some_slots(fixture.map().download(), 7));
+  const Scene scene = prepare(camera, fixture, density, random);
+  fixture.map().reserve(fixture.creation.count());
+  const std::vector<Surfel> there = fixture.map().download();
+  const std::size_t before = fixture.map().size();
   std::set<std::uint32_t> old_slots;
   for (const Surfel& surfel : there) old_slots.insert(surfel.id);
   EXPECT_EQ(old_slots.size(), before);
 
-  EXPECT_EQ(probe.stages().create_surfels(), scene.voxels.size());
-  EXPECT_EQ(probe.map().size(), before + scene.voxels.size());
+  EXPECT_EQ(fixture.creation.count(), scene.voxels.size());
+  fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.settling.tile_views(), fixture.list, fixture.map());
+  EXPECT_EQ(fixture.map().size(), before + scene.voxels.size());
   const std::size_t count = scene.voxels.size();
-  const std::vector<std::uint32_t> slots = probe.find_slots(probe.new_surfels(count), probe.new_cells(count), old_slots);
-  probe.stages().finish_frame();
+  const std::vector<std::uint32_t> slots = fixture.access().find_slots(fixture.creation.new_surfels().surfels.read(count),
+                                                                       fixture.creation.new_surfels().cells.read(count), old_slots);
+  fixture.map().finish_frame("test", 5);
   std::map<std::uint32_t, Surfel> by_slot;
-  for (const Surfel& surfel : probe.map().last_changes().updated) by_slot[surfel.id] = surfel;
+  for (const Surfel& surfel : fixture.map().last_changes().updated) by_slot[surfel.id] = surfel;
   EXPECT_EQ(by_slot.size(), scene.voxels.size());
 
   std::size_t moved = 0;
@@ -228,7 +262,7 @@ std::size_t check_creation(Camera camera, int old_surfels, double density, bool 
     else
       EXPECT_LT((normal - mean).norm(), 1e-4) << "normal " << normal.transpose();
     if (ragged != Truth::open) {
-      EXPECT_EQ(probe.attributes(slots[n]), ragged == Truth::yes ? SURFEL_RAGGED : 0);
+      EXPECT_EQ(fixture.access().attributes(slots[n]), ragged == Truth::yes ? SURFEL_RAGGED : 0);
     }
     const double size = grid.voxel_size(grid.center_of(v.x(), v.y(), v.z()).z());
     EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, size / 2048) << "16 bits";
@@ -241,13 +275,13 @@ std::size_t check_creation(Camera camera, int old_surfels, double density, bool 
 
 TEST(StageCreation, RandomCandidates) {
   std::size_t moved = 0;
-  for (const Camera& camera : cameras()) moved += check_creation(camera, 0, 0.01);
+  for (const CameraSetup& camera : cameras()) moved += check_creation(camera, 0, 0.01);
   EXPECT_TRUE(moved > 50 || small_tests()) << "nothing was moved";
   EXPECT_GT(moved, 0u);
 }
 
 TEST(StageCreation, AtVoxelCentersIfSoConfigured) {
-  for (const Camera& camera : cameras()) EXPECT_EQ(check_creation(camera, 0, 0.01, false), 0u);
+  for (const CameraSetup& camera : cameras()) EXPECT_EQ(check_creation(camera, 0, 0.01, false), 0u);
 }
 
 TEST(StageCreation, FreeSlotsFirst) { check_creation(cameras().front(), 20, 0.05); }
@@ -255,7 +289,7 @@ TEST(StageCreation, FreeSlotsFirst) { check_creation(cameras().front(), 20, 0.05
 TEST(StageCreation, NoCandidates) { check_creation(cameras().front(), 20, 0); }
 
 TEST(StageCreation, MoreSurfelsThanTheMapHasRoomFor) {
-  const Camera camera = small_tests() ? cameras().front() : make_camera(40, 30, 39.1, 37.3, 127);
+  const CameraSetup camera = small_tests() ? cameras().front() : make_camera(40, 30, 39.1, 37.3, 127);
   check_creation(camera, 0, 1);
 }
 

@@ -91,8 +91,8 @@ cl_float4 pack4(const Vector3d& v) { return {{static_cast<float>(v.x()), static_
 Vector3d unpack4(const cl_float4& v) { return {v.s[0], v.s[1], v.s[2]}; }
 
 /// fx and fy differ in most of them.
-std::vector<Camera> grids() {
-  std::vector<Camera> all = cameras();
+std::vector<CameraSetup> grids() {
+  std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
   all.push_back(make_camera(20, 20, 10, 50, 60));
   return all;
@@ -110,7 +110,7 @@ std::vector<cl_float4> random_points(const Nuvg& grid, int count, double around,
 }
 
 TEST(StageGrid, F) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     Random random(1);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -133,7 +133,7 @@ std::vector<cl_int4> all_voxels(const Grid& grid) {
 
 /// F^-1 of the centres of voxels, which F and rounding bring back to their voxels.
 TEST(StageGrid, InverseOfF) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     const Nuvg grid(camera.intrinsics, camera.config);
     const ViewGrid view = make_view_grid(camera.intrinsics, camera.config);
@@ -151,7 +151,7 @@ TEST(StageGrid, InverseOfF) {
 }
 
 TEST(StageGrid, ContinuousAtZMin) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     const Grid g = make_view_grid(camera.intrinsics, camera.config).grid;
     std::vector<cl_float4> points;
@@ -181,7 +181,7 @@ std::vector<cl_float4> awkward_points(const Nuvg& grid, Random& random) {
 }
 
 TEST(StageGrid, VoxelsOfPoints) {
-  for (const Camera& camera : grids()) {
+  for (const CameraSetup& camera : grids()) {
     SCOPED_TRACE(camera.name);
     Random random(3);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -301,7 +301,7 @@ TEST(StageGrid, LowestAndHighestBit) {
 
 /// Where voxels' bits are in bit fields, by rows and by tiles, and the voxels of listed candidates.
 TEST(StageGrid, LayoutOfBitFields) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     const Grid g = make_view_grid(camera.intrinsics, camera.config).grid;
     const std::vector<cl_int4> v = all_voxels(g);

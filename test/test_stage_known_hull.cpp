@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/known_hull.hpp"
+#include "stages/path_fields.hpp"
 #include "stages/reference_hull.hpp"
 #include "stages/reference_paths.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -13,23 +14,26 @@ using namespace reference;
 
 /// @param candidate_density  only the paths around so many voxels are needed; 1: all
 /// @return share of known cells
-double check(const Camera& camera, const Eigen::Isometry3d& T_world_camera, const std::vector<Surfel>& surfels,
+double check(const CameraSetup& camera, const Eigen::Isometry3d& T_world_camera, const std::vector<Surfel>& surfels,
              double candidate_density = 1) {
   Random random(1);
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 1);
-  probe.map().replace(surfels, 1);
+  FrameFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), T_world_camera);
+  fixture.map().replace(surfels, 1);
   const Nuvg grid(camera.intrinsics, camera.config);
   std::vector<SeenSurfel> seen;
-  for (const Surfel& surfel : probe.map().download()) {
+  for (const Surfel& surfel : fixture.map().download()) {
     seen.push_back(see(grid, T_world_camera.inverse(), surfel));
     seen.back().ragged = random.chance(0.05);
-    if (seen.back().ragged) probe.make_ragged({surfel.id});
+    if (seen.back().ragged) fixture.access().make_ragged({surfel.id});
   }
-  const Field<char> candidates = random_field(probe.grid(), candidate_density, random);
-  probe.need_paths_around(candidates);
-  probe.stages().compute_known_hull();
-  const std::vector<Field<char>> actual = probe.hull(), needed = paths_through(around(candidates, 1));
+  const Field<char> candidates = random_field(fixture.grid(), candidate_density, random);
+  Candidates candidate_bits(fixture.commands());
+  NeededPaths paths(fixture.commands());
+  need_paths_around(fixture, candidates, candidate_bits, paths);
+  KnownHull hull(fixture.commands());
+  hull.compute(fixture.frame(), paths, fixture.map());
+  const std::vector<Field<char>> actual = read_hull(fixture.grid(), hull.states()), needed = paths_through(around(candidates, 1));
 
   constexpr double kUnknownScale = 1.5;
   const Hull expected(grid, camera.config.th_d, kUnknownScale, seen);
@@ -49,7 +53,7 @@ double check(const Camera& camera, const Eigen::Isometry3d& T_world_camera, cons
 
 TEST(StageKnownHull, RandomSurfels) {
   double known = 0;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Random random(2);
     const Nuvg grid(camera.intrinsics, camera.config);
@@ -64,7 +68,7 @@ TEST(StageKnownHull, RandomSurfels) {
 
 /// Walls of surfels that look at the grid from all around: most of its faces are known.
 TEST(StageKnownHull, SurroundedByKnownSpace) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   Random random(7);
   const Nuvg grid(camera.intrinsics, camera.config);
   const Eigen::Isometry3d T_world_camera = random.pose(2, 3);
@@ -80,7 +84,7 @@ TEST(StageKnownHull, SurroundedByKnownSpace) {
 
 /// The same surfels twice, once turned round: unknown wins each tie, so nothing is known.
 TEST(StageKnownHull, UnknownWinsTies) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   Random random(4);
   const Nuvg grid(camera.intrinsics, camera.config);
   std::vector<Surfel> surfels = random_surfels(grid, Eigen::Isometry3d::Identity(), 500, 3, 3, random);
@@ -88,17 +92,20 @@ TEST(StageKnownHull, UnknownWinsTies) {
     surfels.push_back(surfels[n]);
     surfels.back().normal = -surfels.back().normal;
   }
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  probe.map().replace(surfels, 1);
-  probe.need_all_paths();
-  probe.stages().compute_known_hull();
-  for (const Field<char>& face : probe.hull())
+  FrameFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  fixture.map().replace(surfels, 1);
+  Candidates candidates(fixture.commands());
+  NeededPaths paths(fixture.commands());
+  need_paths_around(fixture, Field<char>(fixture.grid(), 1), candidates, paths);
+  KnownHull hull(fixture.commands());
+  hull.compute(fixture.frame(), paths, fixture.map());
+  for (const Field<char>& face : read_hull(fixture.grid(), hull.states()))
     for (const char state : face.values) EXPECT_FALSE(state);
 }
 
 TEST(StageKnownHull, NoSurfels) {
-  for (const Camera& camera : cameras()) EXPECT_EQ(check(camera, Eigen::Isometry3d::Identity(), {}), 0);
+  for (const CameraSetup& camera : cameras()) EXPECT_EQ(check(camera, Eigen::Isometry3d::Identity(), {}), 0);
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 
 #include "stages/reference_observed_space.hpp"
 #include "stages/reference_surfels.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/removal.hpp"
+#include "stages/visit_fixture.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 using namespace reference;
 
 struct Scene {
-  Camera camera;
+  CameraSetup camera;
   Nuvg grid;
   WorkingImage image;
   Eigen::Isometry3d T_world_camera;
@@ -48,13 +49,13 @@ Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, c
 
 /// @param removed  of the surfels before;  are_new: all count as changed, whatever the labels do
 /// @return how many surfels lie at surfaces
-std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Surfel>& before, std::size_t removed, bool are_new) {
+std::size_t compare(const Scene& scene, VisitFixture& fixture, const std::vector<Surfel>& before, std::size_t removed, bool are_new) {
   std::map<std::uint32_t, Surfel> after, changed;
-  for (const Surfel& surfel : probe.map().download()) after[surfel.id] = surfel;
-  probe.stages().finish_frame();
-  for (const Surfel& surfel : probe.map().last_changes().updated) changed[surfel.id] = surfel;
+  for (const Surfel& surfel : fixture.map().download()) after[surfel.id] = surfel;
+  fixture.map().finish_frame("test", 4);
+  for (const Surfel& surfel : fixture.map().last_changes().updated) changed[surfel.id] = surfel;
   EXPECT_EQ(after.size() + removed, before.size());
-  const std::vector<float> layer_depth = probe.layer_depth();
+  const std::vector<float> layer_depth = fixture.layer_depth();
   Comparison occupied("occupied"), colored("colour taken"), told("change told");
   std::size_t at_surfaces = 0;
   for (const Surfel& surfel : before) {
@@ -77,7 +78,7 @@ std::size_t compare(const Scene& scene, StagesProbe& probe, const std::vector<Su
   return at_surfaces;
 }
 
-std::size_t check(Camera camera, Content content, int count, bool with_color, double surface_depth, bool are_new) {
+std::size_t check(CameraSetup camera, Content content, int count, bool with_color, double surface_depth, bool are_new) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels" + (with_color ? ", colour" : "") + (are_new ? ", new" : "") +
                ", surface depth " + std::to_string(surface_depth));
   camera.config.surface_depth = surface_depth;
@@ -87,27 +88,25 @@ std::size_t check(Camera camera, Content content, int count, bool with_color, do
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), random_image(camera, content, random), random.pose(2, 3)};
   if (with_color)
     for (std::size_t pixel = 0; pixel < scene.image.depth.size(); ++pixel) scene.image.color.push_back((random.bits() & 0xffffff) | 1);
-  StagesProbe probe(camera.config);
-  const std::vector<std::uint32_t> slots = probe.map().replace(surfels_near_surfaces(scene, count, random), 1);
-  if (count > 10) probe.kill({slots[1], slots[8], slots[9]});
-  const std::vector<Surfel> before = probe.map().download();
-  probe.stages().begin_frame(scene.image, scene.T_world_camera, 4);
-  probe.stages().observe_space();
+  VisitFixture fixture(camera.config);
+  const std::vector<std::uint32_t> slots = fixture.map().replace(surfels_near_surfaces(scene, count, random), 1);
+  if (count > 10) fixture.access().kill({slots[1], slots[8], slots[9]});
+  const std::vector<Surfel> before = fixture.map().download();
+  fixture.begin_and_observe(scene.image, scene.T_world_camera);
   std::size_t removed = 0;
   if (are_new) {
-    probe.change_all();
+    fixture.access().change_all();
   } else {
-    probe.stages().find_candidates();
-    probe.stages().select_in_view();  // says which of those that stay are to be labelled
-    removed = probe.stages().remove_surfels();
+    removed = fixture.look().removed;  // also says which of those that stay are to be labelled
+    remove_surfels(fixture.commands(), fixture.visit.removed(), removed, fixture.map());
   }
-  probe.stages().label_surfels();
-  return compare(scene, probe, before, removed, are_new);
+  label_surfels(fixture.commands(), fixture.frame(), fixture.camera(), fixture.space.column_end(), fixture.map());
+  return compare(scene, fixture, before, removed, are_new);
 }
 
 TEST(StageLabels, RandomSurfels) {
   std::size_t at_surfaces = 0;
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const bool with_color : {false, true})
       for (const bool are_new : {false, true}) {
         const int count = small_tests() ? 200 : 1500;
@@ -119,7 +118,7 @@ TEST(StageLabels, RandomSurfels) {
 }
 
 TEST(StageLabels, OnlyWhereColumnsEnd) {
-  for (const Camera& camera : cameras()) check(camera, Content::mixed, 500, true, 0, false);
+  for (const CameraSetup& camera : cameras()) check(camera, Content::mixed, 500, true, 0, false);
 }
 
 TEST(StageLabels, NumbersOfSurfels) {

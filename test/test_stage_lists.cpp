@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "stages/stages_probe.hpp"
+#include "opencl/lists.hpp"
+#include "stages/random_input.hpp"
+#include "stages/test_device.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -17,9 +19,29 @@ std::vector<std::size_t> sizes() {
   return sizes;
 }
 
+struct TestLists {
+  /// @return prefix sums, the total behind them
+  std::vector<std::uint32_t> scan(const std::vector<std::uint32_t>& values, std::uint32_t* total) {
+    DeviceArray<cl_uint> array(test_commands());
+    array.resize(values.size() + 1);
+    array.write(values);
+    *total = lists.scan("test", array, values.size());
+    return array.read(values.empty() ? 0 : values.size() + 1);
+  }
+
+  std::vector<std::uint32_t> list_bits(const std::vector<std::uint64_t>& words) {
+    DeviceArray<cl_ulong> bits(test_commands());
+    DeviceArray<cl_uint> list(test_commands());
+    bits.write(words);
+    return list.read(lists.list_bits("test", bits, words.size(), list));
+  }
+
+  Lists lists = Lists(test_commands());
+};
+
 TEST(StageLists, PrefixSum) {
   Random random(1);
-  StagesProbe probe({});
+  TestLists lists;
   for (const std::size_t size : sizes()) {
     for (const std::uint32_t largest : {0u, 1u, 200u}) {
       SCOPED_TRACE(std::to_string(size) + " values up to " + std::to_string(largest));
@@ -31,7 +53,7 @@ TEST(StageLists, PrefixSum) {
         sum += values.back();
       }
       if (size > 0) expected.push_back(sum);
-      const auto actual = probe.scan(values, &total);
+      const auto actual = lists.scan(values, &total);
       EXPECT_EQ(total, sum);
       EXPECT_TRUE(actual == expected);
     }
@@ -40,7 +62,7 @@ TEST(StageLists, PrefixSum) {
 
 TEST(StageLists, SetBitsInOrder) {
   Random random(2);
-  StagesProbe probe({});
+  TestLists lists;
   for (const std::size_t size : sizes()) {
     if (size > 200000) continue;
     for (const double density : {0.0, 0.02, 0.5, 1.0}) {
@@ -52,7 +74,7 @@ TEST(StageLists, SetBitsInOrder) {
         words[bit / 64] |= std::uint64_t{1} << (bit % 64);
         expected.push_back(static_cast<std::uint32_t>(bit));
       }
-      EXPECT_TRUE(probe.list_bits(words) == expected);
+      EXPECT_TRUE(lists.list_bits(words) == expected);
     }
   }
 }
@@ -60,7 +82,7 @@ TEST(StageLists, SetBitsInOrder) {
 /// So many words that a CPU, too, counts before it lists.
 TEST(StageLists, SetBitsOfManyWords) {
   Random random(3);
-  StagesProbe probe({});
+  TestLists lists;
   for (const std::size_t size : {std::size_t{1} << 18, (std::size_t{1} << 18) + 1, std::size_t{1} << 19}) {
     std::vector<std::uint64_t> words(size, 0);
     std::vector<std::uint32_t> expected;
@@ -70,7 +92,7 @@ TEST(StageLists, SetBitsOfManyWords) {
       for (std::size_t bit = 0; bit < 64; ++bit)
         if (words[n] >> bit & 1) expected.push_back(static_cast<std::uint32_t>(64 * n + bit));
     }
-    EXPECT_TRUE(probe.list_bits(words) == expected) << size << " words";
+    EXPECT_TRUE(lists.list_bits(words) == expected) << size << " words";
   }
 }
 

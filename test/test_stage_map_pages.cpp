@@ -7,8 +7,8 @@
 #include <map>
 #include <set>
 
+#include "stages/frame_fixture.hpp"
 #include "stages/reference_surfels.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -36,10 +36,10 @@ struct Book {
 /// A map, and the window of a view of it.
 class Pages {
  public:
-  explicit Pages(unsigned seed, Commands& commands = test_commands()) : random_(seed), probe_(camera_.config, commands) {}
+  explicit Pages(unsigned seed, Commands& commands = test_commands()) : random_(seed), fixture_(camera_.config, commands) {}
 
-  StagesProbe& probe() { return probe_; }
-  SurfelMap& map() { return probe_.map(); }
+  FrameFixture& fixture() { return fixture_; }
+  SurfelMap& map() { return fixture_.map(); }
   const Book& book() const { return book_; }
 
   /// Fills the map anew with surfels in and around the next window.
@@ -48,18 +48,18 @@ class Pages {
     const std::vector<Surfel> surfels = random_surfels(grid, pose_, count, 4, 2, random_);
     const std::vector<std::uint32_t> slots = map().replace(surfels, 1);
     book_ = {};
-    for (const std::uint32_t slot : slots) note(slot, to_array(probe_.packed(slot)));
+    for (const std::uint32_t slot : slots) note(slot, to_array(fixture_.access().packed(slot)));
     EXPECT_EQ(book_.surfels.size(), surfels.size()) << "slots are given twice";
     for (std::size_t n = 0; n < surfels.size(); ++n) {
       const BlockKey block = block_of(surfels[n].position, kBlock);
-      EXPECT_EQ(to_array(probe_.packed(slots[n])), to_array(frontier_surfels::pack(surfels[n], block, kBlock)));
-      EXPECT_TRUE(probe_.block_of_slot(slots[n]) == block);
+      EXPECT_EQ(to_array(fixture_.access().packed(slots[n])), to_array(frontier_surfels::pack(surfels[n], block, kBlock)));
+      EXPECT_TRUE(fixture_.access().block_of_slot(slots[n]) == block);
     }
   }
 
   void open_window(std::uint32_t frame) {
     frame_ = frame;
-    probe_.stages().begin_frame(random_image(camera_, Content::all_invalid, random_), pose_, frame);
+    fixture_.begin(random_image(camera_, Content::all_invalid, random_), pose_);
     cells_.clear();
     const MapWindow& window = map().window();
     for (int cell = 0; cell < window.cells(); ++cell)
@@ -76,7 +76,7 @@ class Pages {
       surfels.push_back({{random_.bits(), random_.bits(), random_.bits(), random_.bits()}});
       where.push_back(some[random_.whole(0, cells - 1)]);
     }
-    Commands& commands = probe_.commands();
+    Commands& commands = fixture_.commands();
     DeviceArray<cl_uint4> new_surfels(commands);
     DeviceArray<cl_uint> new_cells(commands);
     new_surfels.write(surfels);
@@ -85,7 +85,7 @@ class Pages {
     map().insert("test", new_surfels, new_cells, count);
     std::set<std::uint32_t> before;
     for (const auto& [slot, surfel] : book_.surfels) before.insert(slot);
-    check_insertion(surfels, where, probe_.find_slots(surfels, where, before));
+    check_insertion(surfels, where, fixture_.access().find_slots(surfels, where, before));
     check_window();
   }
 
@@ -93,10 +93,10 @@ class Pages {
   void check_window() const {
     std::vector<std::uint32_t> expected;
     for (const cl_uint cell : cells_) {
-      const BlockIndex::Pages* pages = probe_.map().index().find(probe_.map().window().block(static_cast<int>(cell)));
+      const BlockIndex::Pages* pages = fixture_.map().index().find(fixture_.map().window().block(static_cast<int>(cell)));
       if (pages != nullptr) expected.insert(expected.end(), pages->begin(), pages->end());
     }
-    std::vector<std::uint32_t> actual = probe_.window_pages();
+    std::vector<std::uint32_t> actual = fixture_.access().window_pages();
     std::sort(actual.begin(), actual.end());
     std::sort(expected.begin(), expected.end());
     EXPECT_TRUE(actual == expected);
@@ -110,7 +110,7 @@ class Pages {
     std::vector<std::uint32_t> slots;
     for (const auto& [slot, surfel] : book_.surfels)
       if (random_.chance(share)) slots.push_back(slot);
-    probe_.kill(slots);
+    fixture_.access().kill(slots);
     for (const std::uint32_t slot : slots) book_.surfels.erase(slot);
     return {slots.begin(), slots.end()};
   }
@@ -130,8 +130,8 @@ class Pages {
     EXPECT_EQ(map().size(), book_.surfels.size());
     ASSERT_EQ(all.size(), book_.surfels.size());
     const std::size_t pages = all.empty() ? 0 : all.back().id / PAGE_SLOTS + 1;
-    const std::vector<cl_uint4> packed_slots = probe_.packed_of(pages);
-    const std::vector<cl_int4> page_blocks = probe_.blocks_of(pages);
+    const std::vector<cl_uint4> packed_slots = fixture_.access().packed_of(pages);
+    const std::vector<cl_int4> page_blocks = fixture_.access().blocks_of(pages);
     auto expected = book_.surfels.begin();
     for (std::size_t n = 0; n < all.size(); ++n, ++expected) {
       ASSERT_EQ(all[n].id, expected->first) << "not by slot";
@@ -154,7 +154,7 @@ class Pages {
 
   void note(std::uint32_t slot, const Packed& surfel) {
     EXPECT_TRUE(book_.surfels.emplace(slot, surfel).second) << "slot " << slot << " was not free";
-    book_.pages[slot / PAGE_SLOTS] = probe_.block_of_slot(slot);
+    book_.pages[slot / PAGE_SLOTS] = fixture_.access().block_of_slot(slot);
   }
 
   /// Each block's new surfels take, in their order, its pages' free slots, lowest first, then those of new pages that nobody has.
@@ -195,10 +195,10 @@ class Pages {
     book_ = after;
   }
 
-  Camera camera_ = make_camera(33, 17, 22.7, 20.1, 64);
+  CameraSetup camera_ = make_camera(33, 17, 22.7, 20.1, 64);
   Random random_;
   Eigen::Isometry3d pose_ = Random(9).pose(2, 3);
-  StagesProbe probe_;
+  FrameFixture fixture_;
   Book book_;
   std::vector<cl_uint> cells_;  ///< that surfels of the grid may be in
   std::uint32_t frame_ = 0, last_page_ = 0;
@@ -321,7 +321,7 @@ TEST(StageMapPages, PagesNearTheWindow) {
   pages.open_window(2);
   const Window& window = pages.map().window().window();
   for (const double distance : {0.0, 0.3, 5.0}) {
-    DeviceArray<cl_uint> list(pages.probe().commands());
+    DeviceArray<cl_uint> list(pages.fixture().commands());
     const std::size_t count = pages.map().list_pages_near(distance, list);
     const std::vector<cl_uint> listed = list.read(count);
     const std::set<std::uint32_t> near(listed.begin(), listed.end());

@@ -2,39 +2,41 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/frame_fixture.hpp"
+#include "stages/observed_space.hpp"
 #include "stages/reference_observed_space.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 using namespace reference;
 
-void check(const Camera& camera, const WorkingImage& image) {
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(image, Eigen::Isometry3d::Identity(), 1);
-  probe.stages().observe_space();
+void check(const CameraSetup& camera, const WorkingImage& image) {
+  FrameFixture fixture(camera.config);
+  fixture.begin(image, Eigen::Isometry3d::Identity());
+  ObservedSpace observed(fixture.commands());
+  observed.compute(fixture.frame(), fixture.camera());
   const Nuvg grid(camera.intrinsics, camera.config);
-  ASSERT_EQ(probe.grid().size_i, grid.size_i);
-  ASSERT_EQ(probe.grid().size_j, grid.size_j);
-  ASSERT_EQ(probe.grid().size_k, grid.size_k);
-  expect_equal("C~", observed_space(grid, image, probe.layer_depth()), probe.observed());
+  ASSERT_EQ(fixture.grid().size_i, grid.size_i);
+  ASSERT_EQ(fixture.grid().size_j, grid.size_j);
+  ASSERT_EQ(fixture.grid().size_k, grid.size_k);
+  expect_equal("C~", observed_space(grid, image, fixture.layer_depth()), fixture.read(observed.bits()));
 }
 
 TEST(StageObservedSpace, LayerDepths) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Random random(1);
-    StagesProbe probe(camera.config);
-    probe.stages().begin_frame(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity(), 1);
+    FrameFixture fixture(camera.config);
+    fixture.begin(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity());
     const Nuvg grid(camera.intrinsics, camera.config);
-    const auto depths = probe.layer_depth();
+    const auto depths = fixture.layer_depth();
     for (int k = 0; k < grid.size_k; ++k) EXPECT_NEAR(depths[k], grid.center_of(0, 0, k).z(), 1e-6) << "layer " << k;
   }
 }
 
 TEST(StageObservedSpace, RandomImages) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     for (const Content content : {Content::mixed, Content::all_valid, Content::all_invalid}) {
       SCOPED_TRACE(camera.name + ", content " + std::to_string(static_cast<int>(content)));
       Random random(2);
@@ -44,7 +46,7 @@ TEST(StageObservedSpace, RandomImages) {
 }
 
 TEST(StageObservedSpace, OneValidPixelAtATime) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   const int pixels = camera.intrinsics.width * camera.intrinsics.height;
   for (int pixel = 0; pixel < pixels; ++pixel) {
     SCOPED_TRACE("pixel " + std::to_string(pixel));
@@ -57,15 +59,15 @@ TEST(StageObservedSpace, OneValidPixelAtATime) {
 
 /// z(k) < d is strict: a depth exactly at a layer's centre does not observe that layer.
 TEST(StageObservedSpace, DepthsExactlyAtLayers) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Random random(3);
     WorkingImage image = random_image(camera, Content::all_valid, random);
-    StagesProbe probe(camera.config);
-    probe.stages().begin_frame(image, Eigen::Isometry3d::Identity(), 1);
-    const std::vector<float> depths = probe.layer_depth();
+    FrameFixture fixture(camera.config);
+    fixture.begin(image, Eigen::Isometry3d::Identity());
+    const std::vector<float> depths = fixture.layer_depth();
     for (float& d : image.depth) {
-      const int k = random.whole(probe.grid().first_pyramid_layer, probe.grid().size_k - 1);
+      const int k = random.whole(fixture.grid().first_pyramid_layer, fixture.grid().size_k - 1);
       d = std::nextafter(depths[k], depths[k] + static_cast<float>(random.whole(-1, 1)));
     }
     check(camera, image);

@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/path_fields.hpp"
 #include "stages/reference_paths.hpp"
 #include "stages/reference_views.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/view_settling.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 using namespace reference;
 
 /// An image of a wall, a little rough and with holes: unlike random depths it hides what is behind, so that tiles need not ask the view.
-WorkingImage wall_image(const Camera& camera, Random& random) {
+WorkingImage wall_image(const CameraSetup& camera, Random& random) {
   WorkingImage image = random_image(camera, Content::all_invalid, random);
   const double distance = random.uniform(camera.config.z_min, 1.2 * camera.config.z_max);
   for (float& d : image.depth)
@@ -20,56 +21,65 @@ WorkingImage wall_image(const Camera& camera, Random& random) {
   return image;
 }
 
+/// The candidates that a frame of this camera has left are those that none of the views knows. @return share of those that one knows
+double expect_settled(FrameFixture& fixture, const CameraSetup& camera, const std::vector<SeenView>& views,
+                      const Eigen::Isometry3d& T_world_camera, Random& random, double density, Candidates& left) {
+  fixture.begin(random_image(camera, Content::all_valid, random), T_world_camera);
+  const Field<char> candidates = random_field(fixture.grid(), density, random);
+  fixture.write(left, candidates);
+  ViewSettling settling(fixture.commands());
+  settling.settle(fixture.frame(), fixture.camera(), fixture.views(), left);
+  const Nuvg grid(camera.intrinsics, camera.config);
+  Field<Truth> expected = grid.field(Truth::no);
+  double known = 0, all = 0;
+  for_each_voxel(candidates, [&](int i, int j, int k) {
+    if (!candidates(i, j, k)) return;
+    expected(i, j, k) = !any_knows(views, T_world_camera * grid.center_of(i, j, k));
+    ++all;
+    known += expected(i, j, k) == Truth::no;
+  });
+  expect_equal("candidates left", expected, fixture.read(left));
+  return all > 0 ? known / all : 0;
+}
+
 /// @param frames  views before the current one, of which the last config.recent_views are kept
 /// @param walls   those views see walls, from anywhere around
 /// @return share of candidates that a view knows
-double check(Camera camera, int frames, int kept, Content content, double density, bool walls = false) {
+double check(CameraSetup camera, int frames, int kept, Content content, double density, bool walls = false) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(frames) + " frames, " + std::to_string(kept) + " views kept, density " +
                std::to_string(density));
   camera.config.recent_views = kept;
   Random random(static_cast<unsigned>(frames));
-  StagesProbe probe(camera.config);
+  FrameFixture fixture(camera.config);
   std::vector<SeenView> views;
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
   for (int frame = 0; frame < frames; ++frame) {
     views.push_back({walls ? wall_image(camera, random) : random_image(camera, content, random),
                      T_world_start * (walls ? random.pose(0.8 * camera.config.z_max, M_PI) : random.pose(0.5, 0.6)),
                      depth_step_for(camera.config.z_max)});
-    probe.views().set_current(views.back().image, views.back().T_world_camera);
-    EXPECT_EQ(probe.views().keep_current(), kept > 0);
+    fixture.views().set_current(views.back().image, views.back().T_world_camera);
+    EXPECT_EQ(fixture.views().keep_current(), kept > 0);
   }
   if (static_cast<int>(views.size()) > kept) views.erase(views.begin(), views.end() - kept);
-  probe.stages().begin_frame(random_image(camera, Content::all_valid, random), T_world_start, 2);
-  const Field<char> candidates = random_field(probe.grid(), density, random);
-  probe.set_candidates(candidates);
-
-  probe.stages().settle_by_recent_views();
-  const Nuvg grid(camera.intrinsics, camera.config);
-  Field<Truth> expected = grid.field(Truth::no);
-  double known = 0, all = 0;
-  for_each_voxel(candidates, [&](int i, int j, int k) {
-    if (!candidates(i, j, k)) return;
-    expected(i, j, k) = !any_knows(views, T_world_start * grid.center_of(i, j, k));
-    ++all;
-    known += expected(i, j, k) == Truth::no;
-  });
-  const Field<char> left = probe.candidates();
-  expect_equal("candidates left", expected, left);
+  Candidates left(fixture.commands());
+  const double known = expect_settled(fixture, camera, views, T_world_start, random, density, left);
 
   // The paths that the known space must be computed on: two voxels around what is left.
-  const std::vector<Field<char>> paths = paths_through(around(left, 2)), actual = probe.needed_paths();
+  NeededPaths needed(fixture.commands());
+  needed.mark(fixture.frame(), left);
+  const std::vector<Field<char>> paths = paths_through(around(fixture.read(left), 2)), actual = read_paths(fixture.grid(), needed);
   for (int family = 0; family < 3; ++family) expect_equal("needed paths, family " + std::to_string(family), paths[family], actual[family]);
-  return all > 0 ? known / all : 0;
+  return known;
 }
 
 TEST(StageRecentViews, RandomViews) {
   double known = 0;
-  for (const Camera& camera : cameras()) known = std::max(known, check(camera, 4, 10, Content::mixed, 0.1));
+  for (const CameraSetup& camera : cameras()) known = std::max(known, check(camera, 4, 10, Content::mixed, 0.1));
   EXPECT_GT(known, 0.1) << "nothing was tested";
 }
 
 TEST(StageRecentViews, FewCandidates) {
-  for (const Camera& camera : cameras()) check(camera, 3, 10, Content::all_valid, 0.002);
+  for (const CameraSetup& camera : cameras()) check(camera, 3, 10, Content::all_valid, 0.002);
 }
 
 TEST(StageRecentViews, EveryVoxelIsACandidate) { check(cameras().front(), 3, 10, Content::all_valid, 1); }
@@ -77,7 +87,7 @@ TEST(StageRecentViews, EveryVoxelIsACandidate) { check(cameras().front(), 3, 10,
 /// More views than a vector has lanes, most of which can know nothing of most tiles, and say so.
 TEST(StageRecentViews, ViewsOfWallsFromAnywhere) {
   double known = 0;
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const double density : {0.002, 0.2})
       for (const int frames : {15, 16, 17, 40}) known = std::max(known, check(camera, frames, 40, Content::mixed, density, true));
   EXPECT_GT(known, 0.1) << "nothing was tested";
@@ -98,17 +108,17 @@ TEST(StageRecentViews, RingForgets) {
 }
 
 TEST(StageRecentViews, KeepsOnlyViewsThatAddSomething) {
-  Camera camera = cameras().front();
+  CameraSetup camera = cameras().front();
   camera.config.recent_view_distance = 0.1;
   camera.config.recent_view_angle = 5;
   Random random(1);
-  StagesProbe probe(camera.config);
+  FrameFixture fixture(camera.config);
   const auto keeps = [&](double x, double degrees) {
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
     T.translation().x() = x;
     T.linear() = Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d::UnitY()).toRotationMatrix();
-    probe.views().set_current(random_image(camera, Content::mixed, random), T);
-    return probe.views().keep_current();
+    fixture.views().set_current(random_image(camera, Content::mixed, random), T);
+    return fixture.views().keep_current();
   };
   EXPECT_TRUE(keeps(0, 0));
   EXPECT_FALSE(keeps(0, 0));
@@ -116,40 +126,41 @@ TEST(StageRecentViews, KeepsOnlyViewsThatAddSomething) {
   EXPECT_TRUE(keeps(0.11, 0));
   EXPECT_TRUE(keeps(0, 5.5));
   EXPECT_FALSE(keeps(0.15, 0)) << "near the second view";
-  EXPECT_EQ(probe.views().count(), 3u);
+  EXPECT_EQ(fixture.views().count(), 3u);
 }
 
 /// While no view was ever forgotten they alone know what is known, and nothing is left for the surfels to decide.
 TEST(StageRecentViews, CompleteUntilOneIsForgotten) {
-  Camera camera = cameras().front();
+  CameraSetup camera = cameras().front();
   camera.config.recent_views = 2;
   Random random(3);
-  StagesProbe probe(camera.config);
-  EXPECT_TRUE(probe.stages().is_open()) << "a map was loaded, say";
-  probe.views().clear(true);
-  for (const bool open : {false, false, true, true}) {
-    probe.stages().begin_frame(random_image(camera, Content::mixed, random), random.pose(2, 3), 1);
-    EXPECT_TRUE(probe.views().keep_current());
-    EXPECT_EQ(probe.stages().is_open(), open);
+  FrameFixture fixture(camera.config);
+  EXPECT_FALSE(fixture.views().complete()) << "a map was loaded, say";
+  fixture.views().clear(true);
+  for (const bool complete : {true, true, false, false}) {
+    fixture.begin(random_image(camera, Content::mixed, random), random.pose(2, 3));
+    EXPECT_TRUE(fixture.views().keep_current());
+    EXPECT_EQ(fixture.views().complete(), complete);
   }
 }
 
 /// Whole steps of depth, rounded down, patch by patch, and behind them the largest of each block: of odd sizes, and with as many steps as
 /// there are.
 TEST(StageRecentViews, StoredDepths) {
-  for (Camera camera : cameras()) {
+  for (CameraSetup camera : cameras()) {
     for (const double z_max : {camera.config.z_max, 4.0}) {
       SCOPED_TRACE(camera.name + ", z_max " + std::to_string(z_max));
       camera.config.z_max = z_max;
       Random random(5);
-      StagesProbe probe(camera.config);
+      FrameFixture fixture(camera.config);
       const WorkingImage image = random_image(camera, Content::mixed, random);
-      probe.views().set_current(image, Eigen::Isometry3d::Identity());
+      fixture.views().set_current(image, Eigen::Isometry3d::Identity());
       const int width = image.intrinsics.width, height = image.intrinsics.height;
       const auto up = [](int size, int part) { return (size + part - 1) / part; };
       const int patches_i = up(width, 8), blocks_i = up(width, VIEW_BLOCK), pixels = 32 * patches_i * up(height, 4);
       std::vector<cl_ushort> stored(pixels + blocks_i * up(height, VIEW_BLOCK));
-      test_commands().queue().enqueueReadBuffer(probe.views().depths(), CL_TRUE, probe.views().own_view().first_pixel * sizeof(cl_ushort),
+      test_commands().queue().enqueueReadBuffer(fixture.views().depths(), CL_TRUE,
+                                                fixture.views().own_view().first_pixel * sizeof(cl_ushort),
                                                 stored.size() * sizeof(cl_ushort), stored.data());
       std::vector<double> expected(stored.size(), 0);
       for (int t = 0; t < height; ++t)
@@ -169,29 +180,48 @@ TEST(StageRecentViews, TooManyPixels) {
   Config config;
   config.recent_views = 1024;
   Random random(6);
-  StagesProbe probe(config);
+  FrameFixture fixture(config);
   const Eigen::Isometry3d here = Eigen::Isometry3d::Identity();
   const WorkingImage large = random_image(make_camera(1500, 1400, 300, 300, 45), Content::all_invalid, random);
-  EXPECT_THROW(probe.views().set_current(large, here), BadFrame);
-  probe.views().set_current(random_image(cameras().front(), Content::all_valid, random), here);
-  EXPECT_TRUE(probe.views().keep_current());
+  EXPECT_THROW(fixture.views().set_current(large, here), BadFrame);
+  fixture.views().set_current(random_image(cameras().front(), Content::all_valid, random), here);
+  EXPECT_TRUE(fixture.views().keep_current());
 }
 
-/// A larger image than ever before has no room beside the kept ones: they go, and nothing is mixed up.
+/// A larger image than ever before needs larger rooms: the kept views move along, and know what they knew.
 TEST(StageRecentViews, LargerImages) {
-  const Camera small = cameras().front(), large = make_camera(20, 15, 15.1, 15.3, 45);
+  const CameraSetup small = cameras().front();
+  CameraSetup large = make_camera(20, 15, 15.1, 15.3, 45);
+  large.config = small.config;
   Random random(2);
-  StagesProbe probe(small.config);
-  const Eigen::Isometry3d near = random.pose(0.1, 0.1), here = Eigen::Isometry3d::Identity();
-  const SeenView before = {random_image(small, Content::all_valid, random), near, depth_step_for(small.config.z_max)};
-  probe.views().set_current(before.image, near);
-  EXPECT_TRUE(probe.views().keep_current());
-  probe.stages().begin_frame(random_image(large, Content::all_valid, random), here, 2);
-  EXPECT_EQ(probe.views().count(), 0u);
-  EXPECT_TRUE(probe.views().keep_current());
-  probe.views().set_current(before.image, near);  // smaller ones fit
-  EXPECT_TRUE(probe.views().keep_current());
-  EXPECT_EQ(probe.views().count(), 2u);
+  FrameFixture fixture(small.config);
+  const double depth_step = depth_step_for(small.config.z_max);
+  const Eigen::Isometry3d here = random.pose(2, 3);
+  std::vector<SeenView> views;
+  const auto keep = [&](const CameraSetup& camera) {
+    views.push_back({random_image(camera, Content::all_valid, random), here * random.pose(0.3, 0.3), depth_step});
+    fixture.views().set_current(views.back().image, views.back().T_world_camera);
+    EXPECT_TRUE(fixture.views().keep_current());
+  };
+  for (const CameraSetup& camera : {small, small, small, large, small, large}) keep(camera);
+  EXPECT_EQ(fixture.views().count(), 6u);
+  for (const CameraSetup& camera : {small, large}) {
+    Candidates left(fixture.commands());
+    EXPECT_GT(expect_settled(fixture, camera, views, here, random, 0.3, left), 0.1) << "nothing was tested";
+  }
+}
+
+/// Cameras that stand in the same place see different things: both views are kept.
+TEST(StageRecentViews, CamerasSideBySide) {
+  const CameraSetup one = cameras().front(), other = make_camera(7, 5, 20.3, 24.1, 33);
+  Random random(4);
+  FrameFixture fixture(one.config);
+  for (const bool is_new : {true, false})
+    for (const CameraSetup& camera : {one, other}) {
+      fixture.views().set_current(random_image(camera, Content::all_valid, random), Eigen::Isometry3d::Identity());
+      EXPECT_EQ(fixture.views().keep_current(), is_new);
+    }
+  EXPECT_EQ(fixture.views().count(), 2u);
 }
 
 }  // namespace

@@ -7,7 +7,9 @@
 
 #include "stages/reference_surfels.hpp"
 #include "stages/reference_views.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/removal.hpp"
+#include "stages/sign_field.hpp"
+#include "stages/visit_fixture.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -59,51 +61,52 @@ struct Marked {
   Expected expected;
 };
 
-Marked check_marks(Camera camera, Content content, int count, double density, bool remove_buried, double min_gap) {
+Marked check_marks(CameraSetup camera, Content content, int count, double density, bool remove_buried, double min_gap) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(count) + " surfels, density " + std::to_string(density) +
                (remove_buried ? ", buried ones too" : "") + ", gaps of " + std::to_string(min_gap) + " m");
   camera.config.remove_buried = remove_buried;
   camera.config.min_gap = min_gap;
   Random random(static_cast<unsigned>(count));
   const Nuvg grid(camera.intrinsics, camera.config);
-  StagesProbe probe(camera.config);
+  VisitFixture fixture(camera.config);
   const SeenView view = {random_image(camera, content, random), random.pose(2, 3), depth_step_for(camera.config.z_max)};
-  probe.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
-  const std::vector<Surfel> map = probe.map().download();
-  if (count > 10) probe.kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
-  probe.stages().begin_frame(view.image, view.T_world_camera, 2);
-  probe.stages().find_candidates();
-  const Field<char> observed = random_field(probe.grid(), density, random);
-  probe.set_observed(observed);
-  Field<char> candidates = random_field(probe.grid(), 0.5, random);  // which are not observed
+  fixture.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
+  const std::vector<Surfel> map = fixture.map().download();
+  if (count > 10) fixture.access().kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
+  fixture.begin_and_observe(view.image, view.T_world_camera);
+  const Field<char> observed = random_field(fixture.grid(), density, random);
+  fixture.write(fixture.observed, observed);
+  Field<char> candidates = random_field(fixture.grid(), 0.5, random);  // which are not observed
   for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
-  probe.set_candidates(candidates);
+  fixture.write(fixture.candidates, candidates);
 
-  probe.stages().select_in_view();
-  EXPECT_EQ(probe.stages().split_surfels(), 0u);
-  const Expected expected = expect_removal(grid, camera.config, view, map, probe.place_surfels(), observed, candidates);
-  const std::vector<std::uint64_t> in_view_words = probe.in_view_words(), removed_words = probe.removed_words();
+  EXPECT_EQ(fixture.look(fixture.observed).large, 0u);
+  ViewSurfels placed(fixture.commands(), fixture.lists());
+  placed.place(fixture.frame(), fixture.visit.in_view(), fixture.map());
+  const Expected expected = expect_removal(grid, camera.config, view, map, placed.surfels().read(placed.count()), observed, candidates);
+  const std::vector<std::uint64_t> in_view_words = fixture.access().words(fixture.visit.in_view()),
+                                   removed_words = fixture.access().words(fixture.visit.removed());
   for (std::size_t n = 0; n < in_view_words.size(); ++n) EXPECT_EQ(removed_words[n] & ~in_view_words[n], 0u) << "others are removed";
-  const std::vector<std::uint32_t> in_view = probe.in_view_slots(), removed_slots = probe.slots_of(removed_words);
+  const std::vector<std::uint32_t> in_view = fixture.in_view_slots(), removed_slots = fixture.access().slots(removed_words);
   const std::set<std::uint32_t> removed(removed_slots.begin(), removed_slots.end());
   {
     Comparison comparison("removed");
     for (std::size_t n = 0; n < in_view.size(); ++n)
       comparison.add(expected.removed[n], removed.count(in_view[n]) != 0, [&] { return "slot " + std::to_string(in_view[n]); });
   }
-  expect_equal("candidates left", expected.candidates, probe.candidates());
+  expect_equal("candidates left", expected.candidates, fixture.read(fixture.candidates));
   return {removed.size(), expected};
 }
 
 TEST(StageRemoval, RandomSurfels) {
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const Content content : {Content::mixed, Content::all_valid, Content::all_invalid})
       for (const double min_gap : {0.0, 0.05})
         for (const bool remove_buried : {false, true}) check_marks(camera, content, 300, 0.3, remove_buried, min_gap);
 }
 
 TEST(StageRemoval, NothingAndEverythingObserved) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   for (const int count : {0, 1, 64, 65, 200}) {
     EXPECT_EQ(check_marks(camera, Content::mixed, count, 0, false, 0).removed, 0u);
     const std::size_t removed = check_marks(camera, Content::mixed, count, 1, false, 0).removed;
@@ -113,7 +116,7 @@ TEST(StageRemoval, NothingAndEverythingObserved) {
 }
 
 TEST(StageRemoval, BuriedSurfelsGo) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   EXPECT_GT(check_marks(camera, Content::all_valid, 300, 0, true, 0).removed, 5u);
 }
 
@@ -121,7 +124,7 @@ TEST(StageRemoval, BuriedSurfelsGo) {
 TEST(StageRemoval, FrontierOnThinGapsGoes) {
   for (const double min_gap : {0.003, 0.03, 0.3}) {
     std::size_t closed = 0, on_thin_bodies = 0;
-    for (const Camera& camera : cameras())
+    for (const CameraSetup& camera : cameras())
       for (const bool remove_buried : {false, true}) {
         const Marked marked = check_marks(camera, Content::all_valid, 600, 0, remove_buried, min_gap);
         closed += marked.expected.closed;
@@ -135,40 +138,41 @@ TEST(StageRemoval, FrontierOnThinGapsGoes) {
 TEST(StageRemoval, FreesSlots) {
   for (const int count : {0, 1, 64, 65, 300}) {
     SCOPED_TRACE(std::to_string(count) + " surfels");
-    const Camera camera = cameras().front();
+    const CameraSetup camera = cameras().front();
     Random random(3);
     const Nuvg grid(camera.intrinsics, camera.config);
-    StagesProbe probe(camera.config);
-    probe.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), count, 2, 2, random), 1);
-    if (count > 64) probe.kill(some_slots(probe.map().download(), 20));
-    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 9);
-    probe.stages().observe_space();  // nothing: no surfel is at a surface
-    probe.stages().find_candidates();
-    probe.stages().select_in_view();
-    probe.stages().split_surfels();
+    VisitFixture fixture(camera.config);
+    fixture.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), count, 2, 2, random), 1);
+    if (count > 64) fixture.access().kill(some_slots(fixture.map().download(), 20));
+    // Nothing is observed: no surfel is at a surface.
+    fixture.begin_and_observe(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+    fixture.look();
+    fixture.split();
     std::map<std::uint32_t, Surfel> expected;
-    for (const Surfel& surfel : probe.map().download()) expected[surfel.id] = surfel;
-    const std::vector<std::uint32_t> slots = probe.in_view_slots();
-    std::vector<std::uint64_t> removed = probe.in_view_words();
+    for (const Surfel& surfel : fixture.map().download()) expected[surfel.id] = surfel;
+    const std::vector<std::uint32_t> slots = fixture.in_view_slots();
+    std::vector<std::uint64_t> removed = fixture.access().words(fixture.visit.in_view());
     for (std::uint64_t& word : removed)
       for (int bit = 0; bit < 64; ++bit)
         if (random.chance(0.6)) word &= ~(std::uint64_t{1} << bit);
-    probe.set_removed_words(removed);
+    BitField removed_bits(fixture.commands());
+    removed_bits.resize(removed.size() + 1);
+    removed_bits.write(removed);
     std::set<std::uint32_t> removed_slots;
-    for (const std::uint32_t slot : probe.slots_of(removed)) {
+    for (const std::uint32_t slot : fixture.access().slots(removed)) {
       removed_slots.insert(slot);
       expected.erase(slot);
     }
     EXPECT_TRUE(slots.size() < 64 || removed_slots.size() > 10) << "nothing was tested";
 
-    EXPECT_EQ(probe.stages().remove_surfels(), removed_slots.size());
-    for (const std::uint32_t slot : removed_slots) EXPECT_FALSE(probe.is_alive(slot));
-    EXPECT_EQ(probe.map().size(), expected.size());
-    const std::vector<Surfel> left = probe.map().download();
+    remove_surfels(fixture.commands(), removed_bits, removed_slots.size(), fixture.map());
+    for (const std::uint32_t slot : removed_slots) EXPECT_FALSE(fixture.access().is_alive(slot));
+    EXPECT_EQ(fixture.map().size(), expected.size());
+    const std::vector<Surfel> left = fixture.map().download();
     ASSERT_EQ(left.size(), expected.size());
     for (const Surfel& surfel : left) EXPECT_TRUE(expected.count(surfel.id) && same(surfel, expected[surfel.id])) << surfel.id;
-    probe.stages().finish_frame();
-    const Changes changes = probe.map().last_changes();
+    fixture.map().finish_frame("test", 9);
+    const Changes changes = fixture.map().last_changes();
     EXPECT_TRUE(changes.updated.empty());
     EXPECT_TRUE(std::set<std::uint32_t>(changes.removed.begin(), changes.removed.end()) == removed_slots);
   }

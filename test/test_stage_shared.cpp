@@ -28,7 +28,7 @@ namespace {
   F(to_image.r22) F(to_image.t0) F(to_image.t1) F(to_image.t2) F(width) F(height) F(first_pixel) F(depth_step)
 #define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
 #define LIMITS_FIELDS(F) \
-  F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(back_probe) F(front_probe) F(min_gap) F(surface_depth) F(median_votes)
+  F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(back_probe) F(front_probe) F(min_gap) F(surface_depth) F(median_votes) F(remove_buried) F(refine)
 // clang-format on
 
 #define NAME(field) #field,
@@ -50,7 +50,9 @@ TestKernels& probes() {
   static auto* const kernels =
       new TestKernels(probe_source("Grid", NAMES(GRID_FIELDS)) + probe_source("Transform", NAMES(TRANSFORM_FIELDS)) +
                       probe_source("Window", NAMES(WINDOW_FIELDS)) + probe_source("View", NAMES(VIEW_FIELDS)) +
-                      probe_source("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS)) + probe_source("Limits", NAMES(LIMITS_FIELDS)));
+                      probe_source("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS)) + probe_source("Limits", NAMES(LIMITS_FIELDS)) +
+                      probe_source("Frame", {"grid.size_i", "limits.th_d", "window.origin_x", "T_camera_local.r00", "T_local_camera.r00",
+                                             "own_view.width", "has_color"}));
   return *kernels;
 }
 
@@ -62,7 +64,6 @@ void check(const std::string& type, const std::vector<std::string>& fields, cons
   for (std::size_t n = 0; n < bits.size(); ++n) bits[n] = 0x3f000000u + 0x1357u * static_cast<std::uint32_t>(n);
   std::memcpy(values.data(), bits.data(), 2 * sizeof(T));
 
-  ASSERT_EQ(4 * fields.size(), sizeof(T)) << "a field is missing in this test";
   const auto out = probes().run<cl_uint>(("probe_" + type).c_str(), 1, values, 1 + 3 * fields.size(), values[0]);
   EXPECT_EQ(out[0], sizeof(T));
   for (std::size_t n = 0; n < fields.size(); ++n) {
@@ -72,40 +73,58 @@ void check(const std::string& type, const std::vector<std::string>& fields, cons
   }
 }
 
+/// The same of a structure's every field.
+template <typename T>
+void check_all(const std::string& type, const std::vector<std::string>& fields, const std::vector<std::size_t>& offsets) {
+  ASSERT_EQ(4 * fields.size(), sizeof(T)) << "a field is missing in this test";
+  check<T>(type, fields, offsets);
+}
+
 TEST(StageShared, Grid) {
 #define OFFSET(field) offsetof(Grid, field),
-  check<Grid>("Grid", NAMES(GRID_FIELDS), {GRID_FIELDS(OFFSET)});
+  check_all<Grid>("Grid", NAMES(GRID_FIELDS), {GRID_FIELDS(OFFSET)});
 #undef OFFSET
 }
 
 TEST(StageShared, Transform) {
 #define OFFSET(field) offsetof(Transform, field),
-  check<Transform>("Transform", NAMES(TRANSFORM_FIELDS), {TRANSFORM_FIELDS(OFFSET)});
+  check_all<Transform>("Transform", NAMES(TRANSFORM_FIELDS), {TRANSFORM_FIELDS(OFFSET)});
 #undef OFFSET
 }
 
 TEST(StageShared, Window) {
 #define OFFSET(field) offsetof(Window, field),
-  check<Window>("Window", NAMES(WINDOW_FIELDS), {WINDOW_FIELDS(OFFSET)});
+  check_all<Window>("Window", NAMES(WINDOW_FIELDS), {WINDOW_FIELDS(OFFSET)});
 #undef OFFSET
 }
 
 TEST(StageShared, View) {
 #define OFFSET(field) offsetof(View, field),
-  check<View>("View", NAMES(VIEW_FIELDS), {VIEW_FIELDS(OFFSET)});
+  check_all<View>("View", NAMES(VIEW_FIELDS), {VIEW_FIELDS(OFFSET)});
 #undef OFFSET
 }
 
 TEST(StageShared, ViewSurfel) {
 #define OFFSET(field) offsetof(ViewSurfel, field),
-  check<ViewSurfel>("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS), {VIEW_SURFEL_FIELDS(OFFSET)});
+  check_all<ViewSurfel>("ViewSurfel", NAMES(VIEW_SURFEL_FIELDS), {VIEW_SURFEL_FIELDS(OFFSET)});
 #undef OFFSET
 }
 
 TEST(StageShared, Limits) {
 #define OFFSET(field) offsetof(Limits, field),
-  check<Limits>("Limits", NAMES(LIMITS_FIELDS), {LIMITS_FIELDS(OFFSET)});
+  check_all<Limits>("Limits", NAMES(LIMITS_FIELDS), {LIMITS_FIELDS(OFFSET)});
 #undef OFFSET
+}
+
+/// The structures of a Frame lie in it as they lie alone, one behind the other.
+TEST(StageShared, Frame) {
+  const std::vector<std::string> fields = {"grid.size_i",        "limits.th_d",    "window.origin_x", "T_camera_local.r00",
+                                           "T_local_camera.r00", "own_view.width", "has_color"};
+  const std::vector<std::size_t> offsets = {offsetof(Frame, grid.size_i),        offsetof(Frame, limits.th_d),
+                                            offsetof(Frame, window.origin_x),    offsetof(Frame, T_camera_local.r00),
+                                            offsetof(Frame, T_local_camera.r00), offsetof(Frame, own_view.width),
+                                            offsetof(Frame, has_color)};
+  check<Frame>("Frame", fields, offsets);
 }
 
 }  // namespace

@@ -7,10 +7,12 @@
 #include <optional>
 
 #include "frame/view_grid.hpp"
+#include "stages/path_fields.hpp"
 #include "stages/reference_paths.hpp"
 #include "stages/reference_sign_field.hpp"
 #include "stages/reference_surfels.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/sign_field.hpp"
+#include "stages/surfel_visit.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -60,13 +62,13 @@ std::vector<ViewSurfel> random_view_surfels(const Grid& g, const Limits& limits,
 }
 
 /// Only the paths through `voxels` must be right.
-void compare(const StagesProbe& probe, const SignField& expected, const Field<char>& voxels) {
+void compare(const FrameFixture& fixture, const BitField& events, const reference::SignField& expected, const Field<char>& voxels) {
   const char* names[] = {"enter forward", "exit forward", "enter backward", "exit backward", "invalid"};
   const std::vector<Field<char>> paths = paths_through(voxels);
   for (int family = 0; family < 3; ++family) {
     for (int event = EVENT_ENTER_FORWARD; event < EVENT_PLANES; ++event) {
       Comparison comparison(std::string(names[event]) + ", family " + std::to_string(family));
-      const Field<char> actual = probe.event(family, event);
+      const Field<char> actual = fixture.read(events, event_offset(fixture.grid(), family, event));
       for_each_voxel(actual, [&](int i, int j, int k) {
         if (!on_path(paths, family, i, j, k)) return;
         const Truth wanted = event == EVENT_INVALID ? expected.invalid(family)(i, j, k) : expected.event(family, event, i, j, k);
@@ -89,21 +91,30 @@ Surfel to_map(const Nuvg& grid, const ViewSurfel& s) {
 }
 
 /// @return all surfels, those in view as they are placed: the map rounds them. Those that are not must make no difference.
-std::vector<ViewSurfel> put_into_map(const Camera& camera, StagesProbe& probe, std::vector<ViewSurfel> surfels) {
+std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fixture, ViewSurfels& view_surfels,
+                                     std::vector<ViewSurfel> surfels) {
   const Nuvg grid(camera.intrinsics, camera.config);
   Random random(1);
   std::vector<Surfel> map;
   for (const ViewSurfel& surfel : surfels) map.push_back(to_map(grid, surfel));
-  const std::vector<std::uint32_t> slots = probe.map().replace(map, 1);
+  const std::vector<std::uint32_t> slots = fixture.map().replace(map, 1);
   std::map<std::uint32_t, ViewSurfel*> by_slot;
   for (std::size_t n = 0; n < surfels.size(); ++n) {
     by_slot[slots[n]] = &surfels[n];
-    if (surfels[n].ragged != 0) probe.make_ragged({slots[n]});
+    if (surfels[n].ragged != 0) fixture.access().make_ragged({slots[n]});
   }
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  probe.stages().find_candidates();
-  probe.stages().select_in_view();
-  for (const ViewSurfel& placed : probe.place_surfels()) {
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  Commands& commands = fixture.commands();
+  BitField observed(commands);
+  fixture.write(observed, Field<char>(fixture.grid(), 0));
+  DeviceArray<cl_int> column_end(commands);
+  column_end.write(std::vector<cl_int>(camera.intrinsics.width * camera.intrinsics.height, 0));
+  Candidates candidates(commands);
+  SurfelVisit visit(commands);
+  candidates.find(fixture.frame(), observed, visit.counters());
+  visit.visit(fixture.frame(), fixture.camera(), observed, column_end, fixture.views(), fixture.map(), candidates);
+  view_surfels.place(fixture.frame(), visit.in_view(), fixture.map());
+  for (const ViewSurfel& placed : view_surfels.surfels().read(view_surfels.count())) {
     ViewSurfel& meant = *by_slot.at(placed.slot);
     EXPECT_LT((Eigen::Vector3d(placed.i, placed.j, placed.k) - Eigen::Vector3d(meant.i, meant.j, meant.k)).norm(), 0.01);
     EXPECT_EQ(placed.ragged, meant.ragged);
@@ -113,27 +124,31 @@ std::vector<ViewSurfel> put_into_map(const Camera& camera, StagesProbe& probe, s
 }
 
 /// @param candidate_density  only the paths around so many voxels are needed; 1: all
-void check(const Camera& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
+void check(const CameraSetup& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
   SCOPED_TRACE(camera.name);
-  std::optional<SignField> expected;
+  std::optional<reference::SignField> expected;
   for (Commands* commands : {&test_commands(), &other_commands()}) {
     SCOPED_TRACE(commands->device().is_cpu ? "one work item a tile" : "64 work items a tile");
     Random random(1);
-    StagesProbe probe(camera.config, *commands);
+    FrameFixture fixture(camera.config, *commands);
+    ViewSurfels view_surfels(*commands, fixture.lists());
     const Grid grid = make_view_grid(camera.intrinsics, camera.config).grid;
-    const std::vector<ViewSurfel> surfels = put_into_map(camera, probe, make_surfels(grid, probe.limits()));
-    if (!expected) expected.emplace(grid, probe.limits(), surfels);
+    const std::vector<ViewSurfel> surfels = put_into_map(camera, fixture, view_surfels, make_surfels(grid, fixture.limits()));
+    if (!expected) expected.emplace(grid, fixture.limits(), surfels);
     const Field<char> candidates = random_field(grid, candidate_density, random);
-    probe.need_paths_around(candidates);
-    for (int family = 0; family < 3; ++family)  // what the last frame left must not matter
-      for (int event = 0; event < EVENT_PLANES; ++event) probe.set_event(family, event, random_field(grid, 0.5, random));
-    probe.stages().compute_sign_field();
-    compare(probe, *expected, around(candidates, 1));
+    Candidates candidate_bits(*commands);
+    NeededPaths needed(*commands);
+    frontier_surfels::SignField field(*commands, fixture.lists());
+    need_paths_around(fixture, random_field(grid, 0.5, random), candidate_bits, needed);
+    field.compute(fixture.frame(), needed, view_surfels);  // what it leaves must not matter
+    need_paths_around(fixture, candidates, candidate_bits, needed);
+    field.compute(fixture.frame(), needed, view_surfels);
+    compare(fixture, field.events(), *expected, around(candidates, 1));
   }
 }
 
 TEST(StageSignField, RandomSurfels) {
-  for (Camera camera : cameras()) {
+  for (CameraSetup camera : cameras()) {
     for (const double th_d : {0.4, 0.174}) {
       camera.config.th_d = th_d;
       check(camera, [](const Grid& g, const Limits& limits) {
@@ -146,7 +161,7 @@ TEST(StageSignField, RandomSurfels) {
 }
 
 TEST(StageSignField, AroundFewCandidates) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     const MakeSurfels make = [](const Grid& g, const Limits& limits) {
       Random random(4);
       return random_view_surfels(g, limits, 100, random);
@@ -157,7 +172,7 @@ TEST(StageSignField, AroundFewCandidates) {
 }
 
 TEST(StageSignField, NoSurfels) {
-  for (const Camera& camera : cameras()) check(camera, [](const Grid&, const Limits&) { return std::vector<ViewSurfel>(); });
+  for (const CameraSetup& camera : cameras()) check(camera, [](const Grid&, const Limits&) { return std::vector<ViewSurfel>(); });
 }
 
 /// Hundreds of surfels in a few voxels: sums beyond 16 bits stay exact.
@@ -176,7 +191,7 @@ TEST(StageSignField, Crowd) {
 
 /// One surfel at a time across the borders of tiles, words and the grid, along each axis.
 TEST(StageSignField, SingleSurfelsAtBorders) {
-  const Camera camera = small_tests() ? cameras().front() : cameras()[3];
+  const CameraSetup camera = small_tests() ? cameras().front() : cameras()[3];
   const std::vector<double> all = {-2.6, -0.7, 0.2, 7.4, 8.1, 31.6, 32.2, 63.5, 64.3};
   for (int axis = 0; axis < 3; ++axis) {
     for (const double at : small_tests() ? std::vector<double>{-0.7, 7.4, 31.6} : all) {

@@ -7,7 +7,8 @@
 #include <set>
 
 #include "stages/reference_surfels.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/sign_field.hpp"
+#include "stages/visit_fixture.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -36,15 +37,15 @@ Levels split_levels(const Nuvg& grid, const SeenSurfel& s) {
 
 /// A map with some free slots, and a view of it. No surfel is so large that its split is a matter of rounding.
 struct Scene {
-  Camera camera;
+  CameraSetup camera;
   Nuvg grid;
   Eigen::Isometry3d T_world_camera;
-  StagesProbe probe;
+  VisitFixture fixture;
 
   /// @param anywhere  so many more are put around the camera
-  Scene(const Camera& with_camera, int count, double around, double largest, unsigned seed, Commands& commands = test_commands(),
+  Scene(const CameraSetup& with_camera, int count, double around, double largest, unsigned seed, Commands& commands = test_commands(),
         int anywhere = 0)
-      : camera(with_camera), grid(camera.intrinsics, camera.config), probe(camera.config, commands) {
+      : camera(with_camera), grid(camera.intrinsics, camera.config), fixture(camera.config, commands) {
     Random random(seed);
     T_world_camera = random.pose(2, 3);
     std::vector<Surfel> surfels;
@@ -56,12 +57,10 @@ struct Scene {
       surfels.back().position = (T_world_camera * (random.direction() * random.uniform(0, 2 * camera.config.z_max))).cast<float>();
     }
     std::vector<std::uint32_t> dead;
-    for (const std::uint32_t slot : probe.map().replace(surfels, 1))
+    for (const std::uint32_t slot : fixture.map().replace(surfels, 1))
       if (slot / PAGE_SLOTS % 4 != 3 && random.chance(0.1)) dead.push_back(slot);  // full pages stay
-    probe.kill(dead);
-    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), T_world_camera, 7);
-    probe.stages().observe_space();  // nothing: no surfel is at a surface
-    probe.stages().find_candidates();
+    fixture.access().kill(dead);
+    fixture.begin_and_observe(random_image(camera, Content::all_invalid, random), T_world_camera);  // nothing: no surfel is at a surface
   }
   SeenSurfel seen(const Surfel& surfel) const { return see(grid, T_world_camera.inverse(), surfel); }
 };
@@ -98,11 +97,11 @@ struct Selected {
 /// All surfels of the map that may touch the grid are in view, and none that is far from it.
 Selected check_selection(const Scene& scene) {
   Selected selected;
-  std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
+  std::vector<std::uint32_t> slots = scene.fixture.in_view_slots();
   std::sort(slots.begin(), slots.end());
   EXPECT_TRUE(std::adjacent_find(slots.begin(), slots.end()) == slots.end());
   std::size_t alive = 0;
-  for (const Surfel& surfel : scene.probe.map().download()) {
+  for (const Surfel& surfel : scene.fixture.map().download()) {
     const bool in_view = std::binary_search(slots.begin(), slots.end(), surfel.id);
     const SeenSurfel s = scene.seen(surfel);
     alive += in_view;
@@ -120,11 +119,11 @@ Selected check_selection(const Scene& scene) {
 
 TEST(StageSurfelsInView, Selection) {
   Selected all;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 130, 24, 2, 1);
-    const std::size_t count = scene.probe.stages().select_in_view();
-    EXPECT_EQ(count, scene.probe.in_view_slots().size());
+    const std::size_t count = scene.fixture.look().in_view;
+    EXPECT_EQ(count, scene.fixture.in_view_slots().size());
     const Selected selected = check_selection(scene);
     all.must += selected.must;
     all.must_not += selected.must_not;
@@ -136,25 +135,26 @@ TEST(StageSurfelsInView, Selection) {
 /// Pages that are full, partly full and empty; with all, some and none of their surfels in view.
 TEST(StageSurfelsInView, Pages) {
   std::size_t full = 0, partly = 0, empty = 0, all = 0, some = 0, none = 0;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 400, 3, 2, 6, test_commands(), 1000);
-    StagesProbe& probe = scene.probe;
-    const std::vector<std::uint32_t> pages = probe.window_pages();
+    VisitFixture& fixture = scene.fixture;
+    const std::vector<std::uint32_t> pages = fixture.access().window_pages();
     ASSERT_FALSE(pages.empty());
     std::vector<std::uint32_t> dead;
     for (const std::size_t n : {pages.size() / 4, pages.size() / 2})
       for (std::uint32_t bit = 0; bit < PAGE_SLOTS; ++bit)
-        if (probe.is_alive(PAGE_SLOTS * pages[n] + bit)) dead.push_back(PAGE_SLOTS * pages[n] + bit);
+        if (fixture.access().is_alive(PAGE_SLOTS * pages[n] + bit)) dead.push_back(PAGE_SLOTS * pages[n] + bit);
     std::sort(dead.begin(), dead.end());
     dead.erase(std::unique(dead.begin(), dead.end()), dead.end());
-    probe.kill(dead);
-    const std::size_t count = probe.stages().select_in_view();
-    EXPECT_EQ(count, probe.in_view_slots().size());
+    fixture.access().kill(dead);
+    const std::size_t count = fixture.look().in_view;
+    EXPECT_EQ(count, fixture.in_view_slots().size());
     check_selection(scene);
-    const std::vector<std::uint64_t> in_view = probe.in_view_words(), large = probe.large_words();
+    const std::vector<std::uint64_t> in_view = fixture.access().words(fixture.visit.in_view()),
+                                     large = fixture.access().words(fixture.visit.large());
     for (std::size_t n = 0; n < pages.size(); ++n) {
-      const std::uint64_t alive = probe.alive_word(pages[n]);
+      const std::uint64_t alive = fixture.access().alive_word(pages[n]);
       EXPECT_EQ(in_view[n] & ~alive, 0u) << "free slots are in view";
       EXPECT_EQ(large[n] & ~in_view[n], 0u) << "large, but not in view";
       full += ~alive == 0;
@@ -172,10 +172,10 @@ TEST(StageSurfelsInView, Pages) {
 
 /// The slots to be split are those of large surfels in the grid. @return how many
 std::size_t check_large(const Scene& scene) {
-  const std::vector<std::uint32_t> slots = scene.probe.large_slots();
+  const std::vector<std::uint32_t> slots = scene.fixture.access().slots(scene.fixture.visit.large());
   const std::set<std::uint32_t> large(slots.begin(), slots.end());
   std::size_t of_map = 0;
-  for (const Surfel& surfel : scene.probe.map().download()) {
+  for (const Surfel& surfel : scene.fixture.map().download()) {
     const Levels expected = split_levels(scene.grid, scene.seen(surfel));
     of_map += large.count(surfel.id);
     if (expected.open) continue;
@@ -187,35 +187,38 @@ std::size_t check_large(const Scene& scene) {
 
 TEST(StageSurfelsInView, Large) {
   std::size_t large = 0;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 200, 6, 10, 7);
-    scene.probe.stages().select_in_view();
+    scene.fixture.look();
     large += check_large(scene);
   }
   EXPECT_GT(large, 20u) << "nothing was tested";
 }
 
 TEST(StageSurfelsInView, SizesOfTheMap) {
-  const Camera camera = cameras().front();
+  const CameraSetup camera = cameras().front();
   for (const int count : {0, 1, 63, 64, 65, 129}) {
     SCOPED_TRACE(std::to_string(count) + " surfels");
     Scene scene(camera, count, -1, 2, 2);  // all well in the grid
-    EXPECT_EQ(scene.probe.stages().select_in_view(), scene.probe.map().size());
-    EXPECT_EQ(scene.probe.stages().split_surfels(), 0u);
+    const SurfelVisit::Found found = scene.fixture.look();
+    EXPECT_EQ(found.in_view, scene.fixture.map().size());
+    EXPECT_EQ(found.large, 0u);
+    EXPECT_EQ(scene.fixture.split(), 0u);
   }
 }
 
 TEST(StageSurfelsInView, HowTheGridSeesThem) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 200, 5, 3, 3);
-    const std::vector<Surfel> surfels = scene.probe.map().download();
-    scene.probe.make_ragged({surfels[3].id, surfels[50].id, surfels[90].id});
-    scene.probe.stages().select_in_view();
-    EXPECT_EQ(scene.probe.stages().split_surfels(), 0u);
-    const std::vector<std::uint32_t> slots = scene.probe.in_view_slots();
-    const std::vector<ViewSurfel> placed = scene.probe.place_surfels();
+    const std::vector<Surfel> surfels = scene.fixture.map().download();
+    scene.fixture.access().make_ragged({surfels[3].id, surfels[50].id, surfels[90].id});
+    EXPECT_EQ(scene.fixture.look().large, 0u);
+    const std::vector<std::uint32_t> slots = scene.fixture.in_view_slots();
+    ViewSurfels view_surfels(scene.fixture.commands(), scene.fixture.lists());
+    view_surfels.place(scene.fixture.frame(), scene.fixture.visit.in_view(), scene.fixture.map());
+    const std::vector<ViewSurfel> placed = view_surfels.surfels().read(view_surfels.count());
     ASSERT_EQ(placed.size(), slots.size());
     std::map<std::uint32_t, Surfel> map;
     for (const Surfel& surfel : surfels) map[surfel.id] = surfel;
@@ -295,7 +298,7 @@ struct Split {
 
 /// @param in_view  slots, page after page;  parents are split in this order
 Split check_split(const Scene& scene, const BySlot& before, const std::vector<std::uint32_t>& in_view) {
-  const BySlot after = by_slot(scene.probe.map().download());
+  const BySlot after = by_slot(scene.fixture.map().download());
   Split split;
   std::vector<std::pair<std::uint32_t, int>> parents;  // and their levels
   std::set<std::uint32_t> stay;
@@ -312,17 +315,18 @@ Split check_split(const Scene& scene, const BySlot& before, const std::vector<st
   split.parents = parents.size();
   for (const std::uint32_t slot : stay) EXPECT_TRUE(after.count(slot) != 0 && same(after.at(slot), before.at(slot))) << "slot " << slot;
   EXPECT_EQ(after.size(), before.size() + split.children - split.parents);
+  const NewSurfels& children = scene.fixture.splitting.children();
   const std::vector<std::uint32_t> slots =
-      scene.probe.find_slots(scene.probe.new_surfels(split.children), scene.probe.new_cells(split.children), stay);
+      scene.fixture.access().find_slots(children.surfels.read(split.children), children.cells.read(split.children), stay);
   auto next = slots.begin();
   for (const auto& [slot, levels] : parents) {
     SCOPED_TRACE("slot " + std::to_string(slot) + ", levels " + std::to_string(levels));
-    std::vector<Surfel> children;
+    std::vector<Surfel> of_parent;
     for (int child = 0; child < 1 << (2 * levels); ++child, ++next) {
       EXPECT_TRUE(split.updated.insert(*next).second) << "two surfels in one slot";
-      children.push_back(after.at(*next));
+      of_parent.push_back(after.at(*next));
     }
-    check_children(before.at(slot), levels, children, position_step(scene.camera.config));
+    check_children(before.at(slot), levels, of_parent, position_step(scene.camera.config));
   }
   for (const std::uint32_t slot : split.updated) split.removed.erase(slot);  // taken again
   return split;
@@ -330,21 +334,21 @@ Split check_split(const Scene& scene, const BySlot& before, const std::vector<st
 
 TEST(StageSurfelsInView, Split) {
   int most_levels = 0;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 150, 3, 20, 4);
-    const BySlot before = by_slot(scene.probe.map().download());
-    scene.probe.stages().select_in_view();
-    const std::vector<std::uint32_t> in_view = scene.probe.in_view_slots();
-    const std::size_t added = scene.probe.stages().split_surfels();
+    const BySlot before = by_slot(scene.fixture.map().download());
+    scene.fixture.look();
+    const std::vector<std::uint32_t> in_view = scene.fixture.in_view_slots();
+    const std::size_t added = scene.fixture.split();
     const Split split = check_split(scene, before, in_view);
     check_selection(scene);  // children are in view, or not, like others; parents no more
     check_large(scene);      // again, at their own depth
     EXPECT_EQ(added, split.children - split.parents);
-    EXPECT_EQ(scene.probe.map().size(), before.size() + added);
+    EXPECT_EQ(scene.fixture.map().size(), before.size() + added);
     most_levels = std::max(most_levels, split.most_levels);
-    scene.probe.stages().finish_frame();
-    const Changes told = scene.probe.map().last_changes();
+    scene.fixture.map().finish_frame("test", 7);
+    const Changes told = scene.fixture.map().last_changes();
     std::set<std::uint32_t> updated;
     for (const Surfel& surfel : told.updated) updated.insert(surfel.id);
     EXPECT_TRUE(updated == split.updated);
@@ -356,25 +360,23 @@ TEST(StageSurfelsInView, Split) {
 /// What is found out of the surfels of a frame that splits some is as if they had been small before.
 TEST(StageSurfelsInView, NothingIsLeftOfParents) {
   std::size_t added = 0, removed = 0;
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Scene scene(camera, 300, 1, 20, 8);
-    StagesProbe& probe = scene.probe;
+    VisitFixture& fixture = scene.fixture;
     Random random(9);
-    probe.stages().begin_frame(random_image(camera, Content::mixed, random), scene.T_world_camera, 8);
-    probe.stages().observe_space();
-    probe.stages().find_candidates();
-    probe.stages().select_in_view();
-    added += probe.stages().split_surfels();
-    const auto candidates = probe.candidates();
-    const auto in_view = probe.in_view_words(), removed_words = probe.removed_words();
-    probe.stages().find_candidates();
-    const std::size_t count = probe.stages().select_in_view();
-    EXPECT_EQ(count, probe.in_view_slots().size());
-    EXPECT_TRUE(in_view == probe.in_view_words());
-    EXPECT_TRUE(removed_words == probe.removed_words());
-    EXPECT_TRUE(candidates.values == probe.candidates().values);
-    removed += probe.slots_of(removed_words).size();
+    fixture.begin_and_observe(random_image(camera, Content::mixed, random), scene.T_world_camera);
+    fixture.look();
+    added += fixture.split();
+    const auto candidates = fixture.read(fixture.candidates);
+    const auto in_view = fixture.access().words(fixture.visit.in_view()), removed_words = fixture.access().words(fixture.visit.removed());
+    fixture.find_candidates(fixture.space.bits());
+    const std::size_t count = fixture.look().in_view;
+    EXPECT_EQ(count, fixture.in_view_slots().size());
+    EXPECT_TRUE(in_view == fixture.access().words(fixture.visit.in_view()));
+    EXPECT_TRUE(removed_words == fixture.access().words(fixture.visit.removed()));
+    EXPECT_TRUE(candidates.values == fixture.read(fixture.candidates).values);
+    removed += fixture.access().slots(removed_words).size();
   }
   EXPECT_GT(added, small_tests() ? 10u : 100u) << "nothing was tested";
   EXPECT_GT(removed, small_tests() ? 0u : 10u) << "nothing was tested";
@@ -383,13 +385,13 @@ TEST(StageSurfelsInView, NothingIsLeftOfParents) {
 TEST(StageSurfelsInView, SplitDoesNotDependOnThreads) {
   const auto one_thread = one_thread_commands();
   if (one_thread == nullptr) GTEST_SKIP() << "The device " << test_commands().device().description << " cannot be limited to one thread.";
-  const Camera camera = cameras().back();
+  const CameraSetup camera = cameras().back();
   std::vector<std::vector<Surfel>> maps;
   for (Commands* with : {&test_commands(), one_thread.get()}) {
     Scene scene(camera, 500, 3, 20, 5, *with);
-    scene.probe.stages().select_in_view();
-    EXPECT_GT(scene.probe.stages().split_surfels(), 0u);
-    maps.push_back(scene.probe.map().download());
+    scene.fixture.look();
+    EXPECT_GT(scene.fixture.split(), 0u);
+    maps.push_back(scene.fixture.map().download());
   }
   EXPECT_TRUE(std::equal(maps[0].begin(), maps[0].end(), maps[1].begin(), maps[1].end(), same));
 }

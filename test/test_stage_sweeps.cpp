@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/path_fields.hpp"
+#include "stages/path_sweeps.hpp"
 #include "stages/reference_paths.hpp"
-#include "stages/stages_probe.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -15,41 +16,47 @@ struct Densities {
 };
 
 struct Input {
+  explicit Input(Commands& commands) : event_bits(commands), hull_bits(commands) {}
+
   Events events;
   std::vector<Field<char>> hull;
+  BitField event_bits, hull_bits;  ///< the same on the device
 };
 
-Input random_input(StagesProbe& probe, const Densities& densities, Random& random) {
-  const Grid& g = probe.grid();
-  Input input;
+void fill(Input& input, const FrameFixture& fixture, const Densities& densities, Random& random) {
+  const Grid& g = fixture.grid();
   for (int family = 0; family < 3; ++family)
     for (int event = 0; event < EVENT_PLANES; ++event) {
       input.events[family][event] = random_field(g, event == EVENT_INVALID ? densities.invalid : densities.event, random);
-      probe.set_event(family, event, input.events[family][event]);
+      fixture.write(input.event_bits, input.events[family][event], event_offset(g, family, event));
     }
   for (int face = FACE_I_LOW; face <= FACE_K_HIGH; ++face) {
     const bool j_face = face == FACE_J_LOW || face == FACE_J_HIGH;
     input.hull.emplace_back(j_face ? g.size_i : g.size_j, 1, face >= FACE_K_LOW ? g.size_i : g.size_k, 0);
     for (char& state : input.hull.back().values) state = random.chance(densities.hull);
   }
-  probe.set_hull(input.hull);
-  probe.set_known(random_field(g, 0.5, random));  // what the last frame left must not matter
-  return input;
+  write_hull(input.hull_bits, input.hull);
 }
 
-void check(const Camera& camera, const Densities& densities) {
+void check(const CameraSetup& camera, const Densities& densities) {
   SCOPED_TRACE(camera.name + ", densities " + std::to_string(densities.event) + " " + std::to_string(densities.hull));
   Random random(static_cast<unsigned>(1000 * densities.event));
-  StagesProbe probe(camera.config);
-  probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-  const Input input = random_input(probe, densities, random);
-  probe.need_all_paths();
-  probe.stages().sweep_paths();
-  expect_equal("K'", sweep(input.events, input.hull), probe.known());
+  FrameFixture fixture(camera.config);
+  fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+  Candidates candidates(fixture.commands());
+  NeededPaths needed(fixture.commands());
+  need_paths_around(fixture, Field<char>(fixture.grid(), 1), candidates, needed);
+  PathSweeps sweeps(fixture.commands());
+  for (int frame = 0; frame < 2; ++frame) {  // what the first one leaves must not matter to the second
+    Input input(fixture.commands());
+    fill(input, fixture, densities, random);
+    sweeps.sweep(fixture.frame(), needed, input.event_bits, input.hull_bits);
+    expect_equal("K'", sweep(input.events, input.hull), fixture.read(sweeps.known()));
+  }
 }
 
 TEST(StageSweeps, RandomEvents) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     check(camera, {0.003, 0.001, 0.2});  // runs over several words
     check(camera, {0.05, 0.02, 0.5});
     check(camera, {0.4, 0.3, 0.5});
@@ -57,28 +64,37 @@ TEST(StageSweeps, RandomEvents) {
 }
 
 TEST(StageSweeps, NoEvents) {
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const double hull : {0.0, 0.1, 1.0}) check(camera, {0, 0, hull});
 }
 
 TEST(StageSweeps, AllInvalid) {
-  for (const Camera& camera : cameras()) check(camera, {0.5, 1, 1});
+  for (const CameraSetup& camera : cameras()) check(camera, {0.5, 1, 1});
 }
 
 /// Where few candidates are left only the paths around them are walked: K' is right where the median looks, and so is K~ at the candidates.
 TEST(StageSweeps, AroundFewCandidates) {
-  for (const Camera& camera : cameras()) {
+  for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
     Random random(7);
-    StagesProbe probe(camera.config);
-    probe.stages().begin_frame(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity(), 1);
-    const Input input = random_input(probe, {0.05, 0.02, 0.5}, random);
-    const Field<char> candidates = random_field(probe.grid(), 0.001, random);
-    probe.need_paths_around(candidates);
-    probe.stages().sweep_paths();
-    probe.stages().filter_median();
+    FrameFixture fixture(camera.config);
+    fixture.begin(random_image(camera, Content::all_invalid, random), Eigen::Isometry3d::Identity());
+    Input before(fixture.commands()), input(fixture.commands());
+    fill(before, fixture, {0.4, 0.3, 0.5}, random);
+    fill(input, fixture, {0.05, 0.02, 0.5}, random);
+    Candidates candidate_bits(fixture.commands());
+    NeededPaths needed(fixture.commands());
+    PathSweeps sweeps(fixture.commands());
+    need_paths_around(fixture, Field<char>(fixture.grid(), 1), candidate_bits, needed);
+    sweeps.sweep(fixture.frame(), needed, before.event_bits, before.hull_bits);  // what it leaves must not matter
+    const Field<char> candidates = random_field(fixture.grid(), 0.001, random);
+    need_paths_around(fixture, candidates, candidate_bits, needed);
+    sweeps.sweep(fixture.frame(), needed, input.event_bits, input.hull_bits);
+    Median filter(fixture.commands());
+    const BitField& filtered_bits = filter.filter(fixture.frame(), sweeps.known(), candidate_bits);
     const Field<char> known = sweep(input.events, input.hull), filtered = median(known, camera.config.median_votes);
-    const Field<char> median_looks = around(candidates, 1), actual_known = probe.known(), actual_filtered = probe.filtered();
+    const Field<char> median_looks = around(candidates, 1), actual_known = fixture.read(sweeps.known()),
+                      actual_filtered = fixture.read(filtered_bits);
     Comparison at_neighbours("K' around candidates"), at_candidates("K~ at candidates");
     for_each_voxel(known, [&](int i, int j, int k) {
       const auto place = [=] { return voxel_text(i, j, k); };

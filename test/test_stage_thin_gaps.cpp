@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/frame_fixture.hpp"
+#include "stages/observed_space.hpp"
 #include "stages/reference_observed_space.hpp"
 #include "stages/reference_paths.hpp"
 #include "stages/reference_views.hpp"
-#include "stages/stages_probe.hpp"
+#include "stages/thin_gaps.hpp"
+#include "stages/view_settling.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -13,7 +16,7 @@ namespace {
 using namespace reference;
 
 struct Scene {
-  Camera camera;
+  CameraSetup camera;
   Nuvg grid;
   SeenView current;
   std::vector<SeenView> kept;
@@ -57,41 +60,61 @@ struct Setup {
   double surface_depth;
 };
 
+/// What the stage needs of others.
+struct GapsFixture : FrameFixture {
+  explicit GapsFixture(const Config& config)
+      : FrameFixture(config),
+        space(commands()),
+        observed(commands()),
+        candidates(commands()),
+        list(commands(), lists()),
+        settling(commands()) {}
+
+  ObservedSpace space;
+  BitField observed;  ///< C~, which need not be that of `space`
+  Candidates candidates;
+  CandidateList list;
+  ViewSettling settling;
+};
+
 /// @param observed_density  of a random C~; negative: the image's own
-Scene prepare(Camera camera, const Setup& setup, double observed_density, StagesProbe& probe, Random& random) {
+Scene prepare(CameraSetup camera, const Setup& setup, double observed_density, GapsFixture& fixture, Random& random) {
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
   const double depth_step = depth_step_for(camera.config.z_max);
   for (int frame = 0; frame < setup.frames; ++frame) {
     const SeenView view = {random_image(camera, setup.content, random), T_world_start * random.pose(0.5, 0.6), depth_step};
-    probe.views().set_current(view.image, view.T_world_camera);
-    EXPECT_EQ(probe.views().keep_current(), setup.recent_views > 0);
+    fixture.views().set_current(view.image, view.T_world_camera);
+    EXPECT_EQ(fixture.views().keep_current(), setup.recent_views > 0);
     if (setup.recent_views > 0) scene.kept.push_back(view);
   }
   scene.current = {random_image(camera, setup.content, random), T_world_start, depth_step};
-  probe.stages().begin_frame(scene.current.image, T_world_start, 2);
-  probe.stages().observe_space();  // where the columns end
-  if (observed_density >= 0) probe.set_observed(random_field(probe.grid(), observed_density, random));
-  scene.observed = probe.observed();
-  scene.layer_depth = probe.layer_depth();
+  fixture.begin(scene.current.image, T_world_start);
+  fixture.space.compute(fixture.frame(), fixture.camera());  // where the columns end
+  scene.observed = observed_density >= 0 ? random_field(fixture.grid(), observed_density, random) : fixture.read(fixture.space.bits());
+  fixture.write(fixture.observed, scene.observed);
+  scene.layer_depth = fixture.layer_depth();
   return scene;
 }
 
 /// @param anywhere  candidates at random unobserved voxels; else those that section 3.5 has
-Tally check(Camera camera, const Setup& setup, double observed_density, bool anywhere) {
+Tally check(CameraSetup camera, const Setup& setup, double observed_density, bool anywhere) {
   SCOPED_TRACE(camera.name + ", gaps of " + std::to_string(setup.min_gap) + " m, " + std::to_string(setup.frames) + " frames, " +
                std::to_string(setup.recent_views) + " views kept, density " + std::to_string(observed_density));
   camera.config.min_gap = setup.min_gap;
   camera.config.recent_views = setup.recent_views;
   camera.config.surface_depth = setup.surface_depth;
   Random random(static_cast<unsigned>(setup.frames));
-  StagesProbe probe(camera.config);
-  const Scene scene = prepare(camera, setup, observed_density, probe, random);
-  Field<char> all = anywhere ? random_field(probe.grid(), 0.5, random) : candidates(scene.observed);
+  GapsFixture fixture(camera.config);
+  const Scene scene = prepare(camera, setup, observed_density, fixture, random);
+  Field<char> all = anywhere ? random_field(fixture.grid(), 0.5, random) : candidates(scene.observed);
   for_each_voxel(all, [&](int i, int j, int k) { all(i, j, k) = all(i, j, k) && !scene.observed(i, j, k); });
-  probe.set_candidates(all);
+  fixture.write(fixture.candidates, all);
 
-  probe.stages().settle_by_recent_views();
+  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.candidates);
+  fixture.list.list(fixture.frame(), fixture.camera(), fixture.observed, fixture.candidates);
+  close_thin_gaps(fixture.commands(), fixture.frame(), fixture.camera(), fixture.space.column_end(), fixture.views(),
+                  fixture.settling.tile_views(), fixture.list, fixture.candidates);
   Tally tally;
   Field<Truth> expected = scene.grid.field(Truth::no);
   for_each_voxel(all, [&](int i, int j, int k) {
@@ -100,7 +123,7 @@ Tally check(Camera camera, const Setup& setup, double observed_density, bool any
     if (settled == Truth::yes) return;
     expected(i, j, k) = setup.min_gap > 0 ? !settled && !closes(scene, {i, j, k}, tally) : !settled;
   });
-  expect_equal("candidates left", expected, probe.candidates());
+  expect_equal("candidates left", expected, fixture.read(fixture.candidates));
   return tally;
 }
 
@@ -109,7 +132,7 @@ constexpr double kSurfaceDepth = 0.1;
 TEST(StageThinGaps, RandomViews) {
   for (const double min_gap : {0.01, 0.1}) {
     Tally tally;
-    for (const Camera& camera : cameras())
+    for (const CameraSetup& camera : cameras())
       for (const Content content : {Content::mixed, Content::all_valid}) {
         tally += check(camera, {min_gap, 3, 10, content, kSurfaceDepth}, 0.2, true);
         check(camera, {min_gap, 3, 10, content, kSurfaceDepth}, 0.02, true);  // most have no normal
@@ -124,7 +147,7 @@ TEST(StageThinGaps, RandomViews) {
 /// With the frame's own C~ and the candidates around it.
 TEST(StageThinGaps, CandidatesOfTheFrame) {
   Tally tally;
-  for (const Camera& camera : cameras())
+  for (const CameraSetup& camera : cameras())
     for (const Content content : {Content::mixed, Content::all_valid})
       tally += check(camera, {0.05, 3, 10, content, kSurfaceDepth}, -1, false);
   const std::size_t few = small_tests() ? 0 : 100;
@@ -135,7 +158,7 @@ TEST(StageThinGaps, CandidatesOfTheFrame) {
 
 TEST(StageThinGaps, SurfacesOnlyWhereColumnsEnd) {
   std::size_t at_surfaces = 0;
-  for (const Camera& camera : cameras()) at_surfaces += check(camera, {0.1, 3, 10, Content::all_valid, 0}, 0.2, true).at_surfaces;
+  for (const CameraSetup& camera : cameras()) at_surfaces += check(camera, {0.1, 3, 10, Content::all_valid, 0}, 0.2, true).at_surfaces;
   EXPECT_GT(at_surfaces, small_tests() ? 0u : 50u) << "nothing was tested";
 }
 

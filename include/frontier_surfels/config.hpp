@@ -1,4 +1,4 @@
-/// Every parameter of the method: the only place with defaults, units, meanings and ranges.
+/// All parameters of the mapper. Defaults, units, meanings and ranges are stated here and nowhere else.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@ namespace frontier_surfels {
 
 struct Config {
   // Device
-  std::string platform;  // part of its name
+  std::string platform;
   std::string device_type = "any";
   int device_index = 0;
   int threads = 0;
@@ -47,79 +47,119 @@ struct Config {
   std::string map_folder;
   double eviction_radius = 20;
 
-  /// Every fault, one sentence each; empty when the configuration can be used.
+  /// A sentence for every fault; empty if the configuration can be used.
   std::vector<std::string> problems() const;
 };
 
 /// What is known of a field beside its value.
 struct FieldInfo {
   const char* name;
-  const char* unit;     ///< "" where there is none
+  const char* unit;     ///< "" if there is none
   const char* meaning;  ///< one sentence
-  double lowest = 0;    ///< numbers only; both ends allowed
+  double lowest = 0;    ///< of numbers only; both ends are allowed
   double highest = 0;
+  const char* group = "";  ///< heading in the table of parameters
 };
 
 /// Calls visit(FieldInfo, field) for every field of `config` (Config or const Config), in order.
-/// YAML files, --set, the parameter table and ROS parameters all go through this list.
+/// YAML files, --set, the table of parameters and ROS parameters all use this list.
 template <typename ConfigT, typename Visitor>
 void for_each_field(ConfigT& config, Visitor&& visit) {
-  visit(FieldInfo{"platform", "", "OpenCL platform: part of its name, any case; empty: the first with a fitting device"}, config.platform);
-  visit(FieldInfo{"device_type", "", "any, cpu, gpu or accelerator"}, config.device_type);
-  visit(FieldInfo{"device_index", "", "which of the fitting devices", 0, 255}, config.device_index);
-  visit(FieldInfo{"threads", "", "compute units to use, where the device can be divided; 0: all", 0, 4096}, config.threads);
-  visit(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 elsewhere", 0, 16}, config.lanes);
+  const char* group = "Device";
+  const auto field = [&visit, &group](FieldInfo info, auto& value) {
+    info.group = group;
+    visit(info, value);
+  };
+  field(FieldInfo{"platform", "", "part of the name of the OpenCL platform, in any case; empty: the first one with a suitable device"},
+        config.platform);
+  field(FieldInfo{"device_type", "", "type of the OpenCL device: any, cpu, gpu or accelerator"}, config.device_type);
+  field(FieldInfo{"device_index", "", "which of the suitable devices to use", 0, 255}, config.device_index);
+  field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
+  field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 on other devices", 0, 16},
+        config.lanes);
 
-  visit(FieldInfo{"decimation", "pixel", "every so many pixels of the depth image are used, in both directions", 1, 64}, config.decimation);
-  visit(FieldInfo{"z_min", "m", "depth below which the grid is a cuboid; nearer measurements are ignored", 0.01, 100}, config.z_min);
-  visit(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
-  visit(FieldInfo{"padding_i", "voxel", "grid beyond the image, left and right", 1, 64}, config.padding_i);
-  visit(FieldInfo{"padding_j", "voxel", "grid beyond the image, above and below", 1, 64}, config.padding_j);
-  visit(FieldInfo{"padding_k", "voxel", "grid behind the camera", 1, 64}, config.padding_k);
+  group = "Working image and grid";
+  field(FieldInfo{"decimation", "pixel", "only every n-th column and row of the depth image is used", 1, 64}, config.decimation);
+  field(FieldInfo{"z_min", "m", "smallest depth that is used; nearer measurements are ignored", 0.01, 100}, config.z_min);
+  field(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
+  field(FieldInfo{"padding_i", "voxel", "width of the grid beyond the left and right edges of the image", 1, 64}, config.padding_i);
+  field(FieldInfo{"padding_j", "voxel", "height of the grid beyond the upper and lower edges of the image", 1, 64}, config.padding_j);
+  field(FieldInfo{"padding_k", "voxel", "depth of the grid behind the camera", 1, 64}, config.padding_k);
 
-  visit(FieldInfo{"carve_no_return", "", "a depth of +Inf observes free space up to z_max"}, config.carve_no_return);
-  visit(FieldInfo{"carve_beyond_range", "", "a depth beyond z_max observes free space up to z_max"}, config.carve_beyond_range);
+  group = "Observed space";
+  field(FieldInfo{"carve_no_return", "", "whether a depth of +Inf means that space is free up to z_max"}, config.carve_no_return);
+  field(FieldInfo{"carve_beyond_range", "", "whether a depth beyond z_max means that space is free up to z_max"},
+        config.carve_beyond_range);
 
-  visit(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger", 0, 0.99}, config.th_d);
-  visit(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);
-  visit(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
-  visit(FieldInfo{"median_votes", "voxel", "known voxels among 27 that make the middle one known", 1, 27}, config.median_votes);
+  group = "Known space from the surfels";
+  field(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger than this", 0, 0.99},
+        config.th_d);
+  field(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);
+  field(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
+  field(FieldInfo{"median_votes", "voxel", "a voxel is known if at least so many of the 27 voxels around and in it are", 1, 27},
+        config.median_votes);
 
-  visit(FieldInfo{"recent_views", "", "views kept for the exact test of new surfels; 0: the paper's method alone", 0, 1024},
-        config.recent_views);
-  visit(FieldInfo{"recent_view_distance", "m", "a view is kept if the camera is so far from every kept one, or ...", 0, 100},
+  group = "Recent views";
+  field(FieldInfo{"recent_views", "", "maximum number of kept views; 0: the paper's method alone", 0, 1024}, config.recent_views);
+  field(FieldInfo{"recent_view_distance", "m", "a view is kept if its camera is at least this far from that of every kept view, or ...", 0,
+                  100},
         config.recent_view_distance);
-  visit(FieldInfo{"recent_view_angle", "deg", "... turned so much against it", 0, 180}, config.recent_view_angle);
-  visit(FieldInfo{"remove_buried", "", "surfels whose back side the new frame sees are removed as well"}, config.remove_buried);
-  visit(FieldInfo{"min_gap", "m", "frontier on a sheet of unknown thinner than this is left out; 0: all is kept", 0, 1}, config.min_gap);
-  visit(FieldInfo{"refine_surfels", "", "new surfels stand near the boundary within their voxel, and their normals end in known space"},
+  field(FieldInfo{"recent_view_angle", "deg", "... turned by at least this angle against it", 0, 180}, config.recent_view_angle);
+
+  group = "Removal, creation and labels";
+  field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);
+  field(FieldInfo{"min_gap", "m", "frontier on a sheet of unknown space thinner than this is left out; 0: none is left out", 0, 1},
+        config.min_gap);
+  field(FieldInfo{"refine_surfels", "",
+                  "whether new surfels move from the centre of their voxel to the boundary, and turn if known space before them is thin"},
         config.refine_surfels);
-  visit(
-      FieldInfo{"surface_depth", "m", "a surfel so little behind a measured surface is occupied; 0: only where a column ends at it", 0, 1},
+  field(
+      FieldInfo{"surface_depth", "m",
+                "a surfel at most this far behind a measured surface is occupied; 0: only a surfel at the end of an observed column", 0, 1},
       config.surface_depth);
 
-  visit(FieldInfo{"map_folder", "", "folder that keeps the map on disk, and what is far from the camera only there; empty: none"},
+  group = "Maps larger than memory";
+  field(FieldInfo{"map_folder", "", "folder on disk that keeps the map, including the parts that are not in memory; empty: none"},
         config.map_folder);
-  visit(FieldInfo{"eviction_radius", "m", "with a map_folder: blocks of the map further from the camera, along an axis, leave memory", 1,
-                  1e6},
+  field(FieldInfo{"eviction_radius", "m",
+                  "with a map_folder: parts of the map farther than this from the camera, along any axis, leave memory", 1, 1e6},
         config.eviction_radius);
 }
 
-/// Reads a flat YAML map of fields over the defaults. Values out of range are left to problems().
-/// @throws FileError  the file cannot be read
-/// @throws Error      every unknown, repeated or malformed entry, with file and line
+/// Reads a flat YAML map of fields; the others keep their defaults. Ranges are not checked here, but by problems().
+/// @throws FileError  if the file cannot be read
+/// @throws Error      names every unknown, repeated or malformed entry with file and line
 Config load_config(const std::string& path);
 
-/// Sets one field from text, as --set key=value does. @throws Error  no such field (with the nearest name), or not of its type
+/// Sets one field from text, as --set key=value does. @throws Error  if there is no such field (names the most similar one), or the text is
+/// not of its type
 void set_field(Config& config, const std::string& name, const std::string& value);
 
-/// "; did you mean 'x'?" with the name nearest to `name` among Config's fields and `more`, or where to find all names if none is near.
+/// "; did you mean 'x'?" with the name most similar to `name` among the fields of Config and `more`. If none is similar, where to find all
+/// names.
 std::string suggestion(const std::string& name, const std::vector<std::string>& more = {});
 
 /// The configuration as YAML that load_config reads back.
 std::string to_yaml(const Config& config);
 
-/// The table of all parameters in Markdown: name, default, unit, range, meaning.
+/// A table of parameters in Markdown, with a heading for each group: a visitor for for_each_field.
+class ParameterTable {
+ public:
+  void operator()(const FieldInfo& info, bool value);
+  void operator()(const FieldInfo& info, int value);
+  void operator()(const FieldInfo& info, double value);
+  void operator()(const FieldInfo& info, const std::string& value);
+
+  const std::string& text() const { return text_; }
+
+ private:
+  void add_row(const FieldInfo& info, const std::string& value, const std::string& range);
+
+  std::string group_;
+  std::string text_;
+};
+
+/// The table of the parameters of Config: name, default, unit, range, meaning.
 std::string parameter_table();
 
 }  // namespace frontier_surfels

@@ -1,9 +1,9 @@
 // LANES points at once: one source for two widths.
 //
-// A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU, whose vectors are used that
-// way, and 1 on a graphics processor, which has a work item for each point. floatv, intv, uintv and ulongv hold one number for each of the
-// LANES: they are vectors of 16, or plain numbers. convert_..., as_..., vloadv and vstorev do for them what OpenCL's functions do for its
-// types. Only this file depends on the width.
+// A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU, whose vectors are used
+// that way, and 1 on a graphics processor, which has a work item for each point. floatv, intv, uintv and ulongv hold one number for each of
+// the LANES: they are vectors of 16, or plain numbers. convert_..., as_..., vloadv and vstorev do for them what OpenCL's functions do for
+// its types. Only this file depends on the width.
 //
 // A mark says yes or no for each lane: an intv whose lanes are -1 or 0. Marks are joined by & | ~, and `mark ? a : b` chooses lane by lane.
 // Comparisons of vectors give -1 or 0, but comparisons of plain numbers give 1 or 0. A comparison that becomes a mark is therefore written
@@ -38,7 +38,7 @@
 #define OF_LANES(name) name
 #define vloadv(offset, from) ((from)[offset])
 #define vstorev(values, offset, to) ((to)[offset] = (values))
-#define MARK(condition) (-((condition) & 1))
+#define MARK(condition) (-((condition)&1))
 #define GATHER(values, at) values[at]
 #else
 #error "LANES must be 16 or 1"
@@ -79,8 +79,8 @@ INLINE void store_runs_of_8(ulongv words, __global ulong* to, int stride, bool m
   if (more) vstore8(words.hi, 0, to + stride);
 }
 
-// Item n of those that fill a bit field puts the bits of its lanes into bits LANES n ... LANES (n + 1) - 1 of the field. Every item must do so.
-// At width 1 several items share a word: there the field must be zero before.
+// Item n of those that fill a bit field puts the bits of its lanes into bits LANES n ... LANES (n + 1) - 1 of the field. Every item must do
+// so. At width 1 several items share a word: there the field must be zero before.
 INLINE void store_lane_bits(uint bits, uint item, __global uint* field) { ((__global ushort*)field)[item] = (ushort)bits; }
 
 // A word of 64 bits that the 64 / LANES items of a work-group that have its lanes put together in local memory.
@@ -172,8 +172,9 @@ INLINE Quads load_quads(__global const uint4* from) {
   return transposed(vload16(0, words), vload16(1, words), vload16(2, words), vload16(3, words));
 }
 INLINE Quads gather_quads(__global const uint4* from, uintv at) {
-  return transposed((uint16)(from[at.s0], from[at.s1], from[at.s2], from[at.s3]), (uint16)(from[at.s4], from[at.s5], from[at.s6], from[at.s7]),
-                    (uint16)(from[at.s8], from[at.s9], from[at.sa], from[at.sb]), (uint16)(from[at.sc], from[at.sd], from[at.se], from[at.sf]));
+  return transposed(
+      (uint16)(from[at.s0], from[at.s1], from[at.s2], from[at.s3]), (uint16)(from[at.s4], from[at.s5], from[at.s6], from[at.s7]),
+      (uint16)(from[at.s8], from[at.s9], from[at.sa], from[at.sb]), (uint16)(from[at.sc], from[at.sd], from[at.se], from[at.sf]));
 }
 #else
 INLINE Quads load_quads(__global const uint4* from) { return (Quads){from->x, from->y, from->z, from->w}; }
@@ -204,14 +205,14 @@ INLINE void scatter_int(intv values, intv at, intv marks, __global int* to) {
 
 // Rounding to whole numbers of either sign, of lanes and, where that is another type, of a single number. OpenCL's own floor and ceil take
 // several times as long in PoCL.
-#define DEFINE_ROUNDING(FLOATS, INTS, TO_INTS, TO_FLOATS)                \
-  INLINE INTS OVERLOADED floor_int(FLOATS x) {                           \
-    const INTS whole = TO_INTS(x);                                       \
-    return whole - (TO_FLOATS(whole) > x ? (INTS)(1) : (INTS)(0));       \
-  }                                                                      \
-  INLINE INTS OVERLOADED ceil_int(FLOATS x) {                            \
-    const INTS whole = TO_INTS(x);                                       \
-    return whole + (TO_FLOATS(whole) < x ? (INTS)(1) : (INTS)(0));       \
+#define DEFINE_ROUNDING(FLOATS, INTS, TO_INTS, TO_FLOATS)          \
+  INLINE INTS OVERLOADED floor_int(FLOATS x) {                     \
+    const INTS whole = TO_INTS(x);                                 \
+    return whole - (TO_FLOATS(whole) > x ? (INTS)(1) : (INTS)(0)); \
+  }                                                                \
+  INLINE INTS OVERLOADED ceil_int(FLOATS x) {                      \
+    const INTS whole = TO_INTS(x);                                 \
+    return whole + (TO_FLOATS(whole) < x ? (INTS)(1) : (INTS)(0)); \
   }
 DEFINE_ROUNDING(floatv, intv, convert_intv, convert_floatv)
 #if LANES > 1
@@ -258,9 +259,7 @@ INLINE Points add_scaled(Points p, floatv scale, Points direction) {
 
 INLINE floatv dot_products(Points a, Points b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-INLINE Points cross_products(Points a, Points b) {
-  return (Points){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+INLINE Points cross_products(Points a, Points b) { return (Points){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
 INLINE floatv lengths(Points p) { return sqrt(dot_products(p, p)); }
 

@@ -88,7 +88,8 @@ namespace frontier_surfels {
 // Numbers of the method ------------------------------------------------------------------------------------------------------------------
 // Those that depend on parameters, or that the host needs as well, are in Limits below.
 
-// Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels. - Supplement B
+// Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels. - Supplement
+// B
 #define SIGN_FIELD_ONE 256
 
 // Surfels in view are those whose ellipsoid comes so near to the grid; generous, as more of them change nothing [voxel]. - Paper 3.4
@@ -181,13 +182,13 @@ typedef struct {
 
 // A surfel as the view's grid sees it.
 typedef struct {
-  float i, j, k;           // grid coordinates of the centre
-  float reach;             // rho = 2 r / delta(z) [voxel]
-  float n_x, n_y, n_z;     // normal, camera frame
-  float n_k;               // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
-  float ray_x, ray_y;      // a step along k moves so many voxels in x and y
-  SHARED_UINT slot;        // in the map
-  SHARED_UINT ragged;      // 1: opens no path to known space, only closes it
+  float i, j, k;        // grid coordinates of the centre
+  float reach;          // rho = 2 r / delta(z) [voxel]
+  float n_x, n_y, n_z;  // normal, camera frame
+  float n_k;            // its cosine with the k paths: z axis in the cuboid, the ray in the pyramid
+  float ray_x, ray_y;   // a step along k moves so many voxels in x and y
+  SHARED_UINT slot;     // in the map
+  SHARED_UINT ragged;   // 1: opens no path to known space, only closes it
 } ViewSurfel;
 
 // Limits of the method: from the configuration, or numbers of the paper (in brackets).
@@ -204,7 +205,19 @@ typedef struct {
   float min_gap;             // frontier on a thinner sheet of unknown is left out; 0: all is kept [m] - ours
   float surface_depth;       // a surfel so little behind a measured surface is occupied [m] - ours
   SHARED_INT median_votes;   // - 3.2, eq. (8)
+  SHARED_INT remove_buried;  // surfels whose back this frame sees are removed, too - ours
+  SHARED_INT refine;         // new surfels leave the centre and the mean direction of their voxel - ours
 } Limits;
+
+// What every stage of a frame is told.
+typedef struct {
+  Grid grid;
+  Limits limits;
+  Window window;
+  Transform T_camera_local, T_local_camera;  // local: the window's frame
+  View own_view;                             // of this frame, as its own camera sees it
+  SHARED_INT has_color;
+} Frame;
 
 #ifndef __OPENCL_VERSION__
 static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
@@ -212,7 +225,8 @@ static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
 static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
-static_assert(sizeof(Limits) == 12 * 4, "Limits must have no padding");
+static_assert(sizeof(Limits) == 14 * 4, "Limits must have no padding");
+static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 1) * 4, "Frame must have no padding");
 }  // namespace frontier_surfels
 #endif
 

@@ -2,8 +2,8 @@
 //
 // The map is made of pages of PAGE_SLOTS surfels, each page of one block of the world. Surfel n of a page is in slot PAGE_SLOTS page + n.
 //   surfels[slots]: 16 bytes each. x: position x, and y in the upper half; y: position z, and in the upper half the radius [m] as a 16-bit
-//     float; z: normal, octahedral, two coordinates of 16 bits in steps of 1 / 32767; w: attributes (common/shared.h). Positions are counted
-//     in 65536ths of the block's edge.
+//     float; z: normal, octahedral, two coordinates of 16 bits in steps of 1 / 32767; w: attributes (common/shared.h). Positions are
+//     counted in 65536ths of the block's edge.
 //   alive[pages]: a bit for each slot that holds a surfel
 //   page_block[pages]: x, y, z of the block; w: number of the frame that changed the page last
 //   changed[pages]: a bit for each slot that this frame has changed, for pages of this frame's window
@@ -12,7 +12,8 @@
 
 #define PAGE_ITEMS (PAGE_SLOTS / LANES)
 
-// Positive floats as 16 bits (IEEE half precision), rounded to nearest. Those that are too small or too large become the nearest that exist.
+// Positive floats as 16 bits (IEEE half precision), rounded to nearest. Those that are too small or too large become the nearest that
+// exist.
 INLINE uintv floats_to_halves(floatv x) { return (as_uintv(clamp(x, 6.2e-5f, 65000.0f)) + 0x1000u - (112u << 23)) >> 13; }
 INLINE floatv halves_to_floats(uintv bits) { return as_floatv((bits << 13) + (112u << 23)); }
 

@@ -54,9 +54,26 @@ typedef struct {
 
 //   group[VIEW_LANE_FIELDS][VIEW_GROUP]: of view_lanes;  part: 0 ... VIEW_PARTS - 1
 INLINE ViewLanes load_view_lanes(__global const float* group, int part) {
-#define FIELD(field) vloadv(VIEW_PARTS * VIEW_LANE_##field + part, group)
-  ViewLanes v = {FIELD(R00), FIELD(R01), FIELD(R02), FIELD(R10), FIELD(R11), FIELD(R12), FIELD(R20), FIELD(R21), FIELD(R22),   FIELD(T0),
-                 FIELD(T1),  FIELD(T2),  FIELD(FX),  FIELD(FY),  FIELD(CX),  FIELD(CY),  FIELD(WIDTH), FIELD(HEIGHT), as_uintv(FIELD(FIRST_PIXEL))};
+#define FIELD(field) vloadv(VIEW_PARTS* VIEW_LANE_##field + part, group)
+  ViewLanes v = {FIELD(R00),
+                 FIELD(R01),
+                 FIELD(R02),
+                 FIELD(R10),
+                 FIELD(R11),
+                 FIELD(R12),
+                 FIELD(R20),
+                 FIELD(R21),
+                 FIELD(R22),
+                 FIELD(T0),
+                 FIELD(T1),
+                 FIELD(T2),
+                 FIELD(FX),
+                 FIELD(FY),
+                 FIELD(CX),
+                 FIELD(CY),
+                 FIELD(WIDTH),
+                 FIELD(HEIGHT),
+                 as_uintv(FIELD(FIRST_PIXEL))};
 #undef FIELD
   v.cx += 0.5f;
   v.cy += 0.5f;
@@ -140,7 +157,8 @@ uint part_of_box(__global const float* group, int part, __global const View* vie
 
   const intv in_front = MARK(near > 0.01f);
   const floatv by_near = v.fx / near, by_far = v.fx / far, scale = v.fy / v.fx;
-  const floatv left = b.center.x - b.half_size.x, right = b.center.x + b.half_size.x, top = b.center.y - b.half_size.y, bottom = b.center.y + b.half_size.y;
+  const floatv left = b.center.x - b.half_size.x, right = b.center.x + b.half_size.x, top = b.center.y - b.half_size.y,
+               bottom = b.center.y + b.half_size.y;
   int first_s[LANES], last_s[LANES], first_t[LANES], last_t[LANES];
   float nearest[LANES];
   vstorev(convert_intv(clamp(fmin(left * by_near, left * by_far) + v.cx - slack_x, 0.0f, v.width - 1.0f)), 0, first_s);

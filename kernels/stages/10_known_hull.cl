@@ -85,31 +85,32 @@ INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfe
                axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
 }
 
-// One work item handles LANES surfels of a page: those beyond a face, and within its range in the other two coordinates (with their own reach
-// as a margin), enter it. Work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
+// One work item handles LANES surfels of a page: those beyond a face, and within its range in the other two coordinates (with their own
+// reach as a margin), enter it. Work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
 //   in  pages[count];  alive, page_block, surfels: the map;  lines: of 8_needed_paths
 //   i/o faces: six images of keys, HULL_EMPTY before; they are right on the paths to be walked
-__kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
-                           __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
-                           __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
+__kernel void project_hull(const Frame f, __global const uint* pages, const uint count, __global const ulong* alive,
+                           __global const int4* page_block, __global const uint4* surfels, __global const uint* lines,
+                           __global uint* faces) {
   const uint n = get_global_id(0) / PAGE_ITEMS;
   if (n >= count) return;
   const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page], first);
   if (lanes == 0) return;
-  Surfels s = load_surfels(&window, surfels, page_block[page], first);
-  s.position = transformed(&T_camera_local, s.position);
-  const Voxels at = voxels_at(&g, s.position);
-  const intv reach = convert_intv(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.position.z, g.z_min)) + 2;
-  const intv near_i = MARK((at.i >= -reach) & (at.i < g.size_i + reach)), near_j = MARK((at.j >= -reach) & (at.j < g.size_j + reach)),
-             near_k = MARK((at.k >= -reach) & (at.k < g.size_k + reach));
-  const intv beyond_i = MARK((at.i < 0) | (at.i >= g.size_i)), beyond_j = MARK((at.j < 0) | (at.j >= g.size_j)),
-             beyond_k = MARK((at.k < 0) | (at.k >= g.size_k));
+  Surfels s = load_surfels(&f.window, surfels, page_block[page], first);
+  s.position = transformed(&f.T_camera_local, s.position);
+  const Voxels at = voxels_at(&f.grid, s.position);
+  const intv reach = convert_intv(2.0f * f.limits.hull_unknown_scale * s.radius * f.grid.f / fmax(s.position.z, f.grid.z_min)) + 2;
+  const intv near_i = MARK((at.i >= -reach) & (at.i < f.grid.size_i + reach)),
+             near_j = MARK((at.j >= -reach) & (at.j < f.grid.size_j + reach)),
+             near_k = MARK((at.k >= -reach) & (at.k < f.grid.size_k + reach));
+  const intv beyond_i = MARK((at.i < 0) | (at.i >= f.grid.size_i)), beyond_j = MARK((at.j < 0) | (at.j >= f.grid.size_j)),
+             beyond_k = MARK((at.k < 0) | (at.k >= f.grid.size_k));
   uint left = lanes & lane_bits((beyond_i & near_j & near_k) | (beyond_j & near_i & near_k) | (beyond_k & near_i & near_j));
   if (left == 0) return;
   ViewSurfel placed[LANES];
-  place_in_view(&g, &s, rotated(&T_camera_local, unpack_normals(s.normal)), first + as_uintv(lane_numbers()), placed);
-  for (; left != 0; left &= left - 1) enter_surfel(&g, &limits, &placed[lowest_lane(left)], lines, faces);
+  place_in_view(&f.grid, &s, rotated(&f.T_camera_local, unpack_normals(s.normal)), first + as_uintv(lane_numbers()), placed);
+  for (; left != 0; left &= left - 1) enter_surfel(&f.grid, &f.limits, &placed[lowest_lane(left)], lines, faces);
 }
 
 // Is the state of a cell known? Not if no surfel was met there or beside it.
@@ -130,18 +131,19 @@ INLINE uint hull_word_offset(const Grid* g, int face) {
 
 // One work item handles a word of the hull: of face get_global_id(1).
 //   in  faces: of project_hull;   out hull: words as hull_word_offset says, 1 = known
-__kernel void hull_states(const Grid g, __global const uint* faces, __global ulong* hull) {
+__kernel void hull_states(const Frame f, __global const uint* faces, __global ulong* hull) {
   const int word = get_global_id(0), face = get_global_id(1);
-  __global const uint* image = faces + face_offset(&g, face);
+  __global const uint* image = faces + face_offset(&f.grid, face);
   if (face >= FACE_K_LOW) {
-    if (word >= g.size_i * g.size_j) return;
-    hull[hull_word_offset(&g, face) + word] = hull_cell(image, g.size_i, g.size_j, word % g.size_i, word / g.size_i) ? 1 : 0;
+    if (word >= f.grid.size_i * f.grid.size_j) return;
+    hull[hull_word_offset(&f.grid, face) + word] =
+        hull_cell(image, f.grid.size_i, f.grid.size_j, word % f.grid.size_i, word / f.grid.size_i) ? 1 : 0;
     return;
   }
-  const int rows = face <= FACE_I_HIGH ? g.size_j : g.size_i;
-  if (word >= rows * g.words_k) return;
-  const int row = word / g.words_k, first = word % g.words_k * 64;
+  const int rows = face <= FACE_I_HIGH ? f.grid.size_j : f.grid.size_i;
+  if (word >= rows * f.grid.words_k) return;
+  const int row = word / f.grid.words_k, first = word % f.grid.words_k * 64;
   ulong bits = 0;
-  for (int k = first; k < min(first + 64, g.size_k); ++k) bits |= (ulong)hull_cell(image, g.size_k, rows, k, row) << (k - first);
-  hull[hull_word_offset(&g, face) + word] = bits;
+  for (int k = first; k < min(first + 64, f.grid.size_k); ++k) bits |= (ulong)hull_cell(image, f.grid.size_k, rows, k, row) << (k - first);
+  hull[hull_word_offset(&f.grid, face) + word] = bits;
 }

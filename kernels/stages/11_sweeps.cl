@@ -1,7 +1,7 @@
 // Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family, gives K'.
 //
-// At each voxel, in this order: if it is invalid or an exit, e = 0; K' |= e; if it is an entry and not invalid, e = 1. Along i and j one word
-// carries 64 paths.
+// At each voxel, in this order: if it is invalid or an exit, e = 0; K' |= e; if it is an entry and not invalid, e = 1. Along i and j one
+// word carries 64 paths.
 //   in  events[3][EVENT_PLANES]: bit fields of 9_sign_field;  hull: of 10_known_hull: states in which paths enter the grid
 //       lines: of 8_needed_paths: other paths are not walked
 //   i/o known: bit field K'
@@ -31,26 +31,26 @@ void sweep_words(__global const ulong* events, size_t plane, int first, int stri
 }
 
 // One work item handles a word (j, w) of the i faces. This kernel runs first: it sets known, and the others add to it.
-__kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+__kernel void sweep_i(const Frame f, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);
-  if (path >= g.size_j * g.words_k || !is_needed(lines, 2 * path)) return;
-  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
-  sweep_words(events, plane, path * g.size_i, 1, g.size_i, hull[hull_word_offset(&g, FACE_I_LOW) + path],
-              hull[hull_word_offset(&g, FACE_I_HIGH) + path], known, true);
+  if (path >= f.grid.size_j * f.grid.words_k || !is_needed(lines, 2 * path)) return;
+  const size_t plane = (size_t)f.grid.size_i * f.grid.size_j * f.grid.words_k;
+  sweep_words(events, plane, path * f.grid.size_i, 1, f.grid.size_i, hull[hull_word_offset(&f.grid, FACE_I_LOW) + path],
+              hull[hull_word_offset(&f.grid, FACE_I_HIGH) + path], known, true);
 }
 
 // One work item handles a word (i, w) of the j faces.
-__kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+__kernel void sweep_j(const Frame f, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);
-  if (path >= g.size_i * g.words_k) return;
-  const int i = path % g.size_i, w = path / g.size_i;
-  if (!is_needed(lines, lines_j(&g, i, w))) return;
-  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
-  sweep_words(events + EVENT_PLANES * plane, plane, word_index(&g, i, 0, w), g.size_i * g.words_k, g.size_j,
-              hull[hull_word_offset(&g, FACE_J_LOW) + i * g.words_k + w], hull[hull_word_offset(&g, FACE_J_HIGH) + i * g.words_k + w],
-              known, false);
+  if (path >= f.grid.size_i * f.grid.words_k) return;
+  const int i = path % f.grid.size_i, w = path / f.grid.size_i;
+  if (!is_needed(lines, lines_j(&f.grid, i, w))) return;
+  const size_t plane = (size_t)f.grid.size_i * f.grid.size_j * f.grid.words_k;
+  sweep_words(events + EVENT_PLANES * plane, plane, word_index(&f.grid, i, 0, w), f.grid.size_i * f.grid.words_k, f.grid.size_j,
+              hull[hull_word_offset(&f.grid, FACE_J_LOW) + i * f.grid.words_k + w],
+              hull[hull_word_offset(&f.grid, FACE_J_HIGH) + i * f.grid.words_k + w], known, false);
 }
 
 // One path, up a word's bits: between events its state is a run.
@@ -89,25 +89,25 @@ INLINE ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
 }
 
 // One work item handles a path (i, j).
-__kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
+__kernel void sweep_k(const Frame f, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);
-  if (path >= g.size_i * g.size_j) return;
-  const int i = path % g.size_i, j = path / g.size_i;
-  if (lines[lines_k(&g, i, j)] == 0) return;
-  const size_t plane = (size_t)g.size_i * g.size_j * g.words_k;
+  if (path >= f.grid.size_i * f.grid.size_j) return;
+  const int i = path % f.grid.size_i, j = path / f.grid.size_i;
+  if (lines[lines_k(&f.grid, i, j)] == 0) return;
+  const size_t plane = (size_t)f.grid.size_i * f.grid.size_j * f.grid.words_k;
   __global const ulong* planes = events + 2 * EVENT_PLANES * plane;
 
-  bool e = hull[hull_word_offset(&g, FACE_K_LOW) + path] != 0;
-  for (int w = 0; w < g.words_k; ++w) {
-    const int at = word_index(&g, i, j, w);
-    known[at] |= valid_layers(&g, w) & walk_up(&e, planes[EVENT_ENTER_FORWARD * plane + at], planes[EVENT_EXIT_FORWARD * plane + at],
-                                               planes[EVENT_INVALID * plane + at]);
+  bool e = hull[hull_word_offset(&f.grid, FACE_K_LOW) + path] != 0;
+  for (int w = 0; w < f.grid.words_k; ++w) {
+    const int at = word_index(&f.grid, i, j, w);
+    known[at] |= valid_layers(&f.grid, w) & walk_up(&e, planes[EVENT_ENTER_FORWARD * plane + at], planes[EVENT_EXIT_FORWARD * plane + at],
+                                                    planes[EVENT_INVALID * plane + at]);
   }
-  e = hull[hull_word_offset(&g, FACE_K_HIGH) + path] != 0;
-  for (int w = g.words_k - 1; w >= 0; --w) {
-    const int at = word_index(&g, i, j, w);
-    known[at] |= valid_layers(&g, w) & walk_down(&e, planes[EVENT_ENTER_BACKWARD * plane + at], planes[EVENT_EXIT_BACKWARD * plane + at],
-                                                 planes[EVENT_INVALID * plane + at]);
+  e = hull[hull_word_offset(&f.grid, FACE_K_HIGH) + path] != 0;
+  for (int w = f.grid.words_k - 1; w >= 0; --w) {
+    const int at = word_index(&f.grid, i, j, w);
+    known[at] |= valid_layers(&f.grid, w) & walk_down(&e, planes[EVENT_ENTER_BACKWARD * plane + at],
+                                                      planes[EVENT_EXIT_BACKWARD * plane + at], planes[EVENT_INVALID * plane + at]);
   }
 }

@@ -4,9 +4,8 @@
 //   in  voxels[count], directions: of find_directions;  candidates: bit field by tiles, as 32-bit halves: those that close_gaps has left
 //       known: bit field K~, as 32-bit halves, if has_known
 //   out kept[(count + 63) / 64 words]: a bit for each listed candidate that makes a surfel, as 32-bit halves; at width 1 zero before
-__kernel void filter_candidates(const Grid g, const Limits limits, __global const int* voxels, const int count,
-                                __global const float* directions, __global const int* candidates, const int has_known,
-                                __global const int* known, __global uint* kept) {
+__kernel void filter_candidates(const Frame f, __global const int* voxels, const int count, __global const float* directions,
+                                __global const int* candidates, const int has_known, __global const int* known, __global uint* kept) {
   const int chunk = get_global_id(0);
   if (chunk >= (count + 63) / 64 * (64 / LANES)) return;
   uint open_bits = 0;
@@ -14,8 +13,8 @@ __kernel void filter_candidates(const Grid g, const Limits limits, __global cons
     intv exist;
     const intv numbers = load_chunk(voxels, count, chunk, &exist), bit = half_bits(numbers);
     intv open = exist & MARK((gather_int(candidates, numbers / 32) & bit) != 0) &
-                MARK(lengths(load_directions(directions, chunk)) >= limits.normal_min);
-    if (has_known) open &= MARK((gather_int(known, voxel_halves(&g, voxels_of(&g, numbers))) & bit) == 0);
+                MARK(lengths(load_directions(directions, chunk)) >= f.limits.normal_min);
+    if (has_known) open &= MARK((gather_int(known, voxel_halves(&f.grid, voxels_of(&f.grid, numbers))) & bit) == 0);
     open_bits = lane_bits(open);
   }
   store_lane_bits(open_bits, chunk, kept);

@@ -1,8 +1,8 @@
-// Creation - paper 3.5, eq. (14)-(16): a surfel for each candidate that is left and has a normal, at its voxel's centre. Ours, if refine: its
-// normal ends in known space, and it slides towards the boundary.
+// Creation - paper 3.5, eq. (14)-(16): a surfel for each candidate that is left and has a normal, at its voxel's centre. Ours, if refine:
+// its normal ends in known space, and it slides towards the boundary.
 
-// Normals of new surfels: the mean direction; or, where that leaves known space again at front_probe (thin or ragged space), the direction to
-// a single observed voxel that does not and that is nearest to the mean. Such a surfel is ragged.
+// Normals of new surfels: the mean direction; or, where that leaves known space again at front_probe (thin or ragged space), the direction
+// to a single observed voxel that does not and that is nearest to the mean. Such a surfel is ragged.
 //   center: of the voxels, mean: normalised, both camera frame;  around: observed_around the voxels;   out ragged: marks
 INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* view, __global const ushort* depths,
                              __global const float* layer_depth, Voxels v, Points center, Points mean, intv around, intv asked,
@@ -59,11 +59,9 @@ INLINE Points slide_to_boundary(const Grid* g, const Limits* limits, const View*
 
 // One work item handles a chunk of LANES new surfels.
 //   in  created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
-//       refine: whether they leave their voxels' centres and mean normals
-//       view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of settle_candidates;  depths: their images
+//       views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this frame's among them
 //   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
-__kernel void create_surfels(const Grid g, const Limits limits, const Window window, const Transform T_local_camera, const int refine,
-                             const View view, __global const View* views, __global const ushort* tile_views, const int view_groups,
+__kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
                              __global const ushort* depths, __global const float* layer_depth, __global const int* created, const int count,
                              __global const int* voxels, __global const int* around, __global const float* directions,
                              __global uint4* new_surfels, __global int* new_cells) {
@@ -71,20 +69,21 @@ __kernel void create_surfels(const Grid g, const Limits limits, const Window win
   if (chunk * LANES >= count) return;
   intv exist, ragged = 0;
   const intv numbers = load_chunk(created, count, chunk, &exist);
-  const Voxels v = voxels_of(&g, gather_int(voxels, numbers));
-  const Points center = voxel_centers(&g, layer_depth, v);
+  const Voxels v = voxels_of(&f.grid, gather_int(voxels, numbers));
+  const Points center = voxel_centers(&f.grid, layer_depth, v);
   Points p = center, normal = normalized(gather_directions(directions, numbers));
-  if (refine) {
+  if (f.limits.refine) {
     ViewsAround near;
-    find_views_around(&g, views, tile_views, view_groups, v, &near);
-    normal = surfel_normals(&g, &limits, &view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist, &ragged);
-    p = slide_to_boundary(&g, &limits, &view, &near, depths, v, center, normal, exist);
+    find_views_around(&f.grid, views, tile_views, view_groups, v, &near);
+    normal = surfel_normals(&f.grid, &f.limits, &f.own_view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist,
+                            &ragged);
+    p = slide_to_boundary(&f.grid, &f.limits, &f.own_view, &near, depths, v, center, normal, exist);
   }
-  const floatv radius = limits.create_radius * voxel_size(&g, center.z);
+  const floatv radius = f.limits.create_radius * voxel_size(&f.grid, center.z);
   const uintv attributes = ragged ? (uintv)(SURFEL_RAGGED) : (uintv)(0);
   intv cells;
   const Quads packed =
-      pack_surfels(&window, transformed(&T_local_camera, p), radius, rotated(&T_local_camera, normal), attributes, &cells);
+      pack_surfels(&f.window, transformed(&f.T_local_camera, p), radius, rotated(&f.T_local_camera, normal), attributes, &cells);
   scatter_quads(packed, chunk * LANES + lane_numbers(), exist, new_surfels);
   store_first(cells, count - chunk * LANES, new_cells + chunk * LANES);
 }

@@ -5,8 +5,7 @@
 //   in  changed: which surfels they are;  depth, column_end: of 1_observed_space
 //       color[height][width]: red | green << 8 | blue << 16, if has_color
 //   i/o surfels: their attributes
-__kernel void label_surfels(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
-                            __global const float* depth, __global const int* column_end, __global const uint* color, const int has_color,
+__kernel void label_surfels(const Frame f, __global const float* depth, __global const int* column_end, __global const uint* color,
                             __global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
                             __global const int4* page_block, __global uint4* surfels) {
   const uint n = get_global_id(0) / PAGE_ITEMS;
@@ -14,18 +13,18 @@ __kernel void label_surfels(const Grid g, const Limits limits, const Window wind
   const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page] & changed[page], first);
   if (lanes == 0) return;
-  const Surfels s = load_surfels(&window, surfels, page_block[page], first);
-  const Points position = transformed(&T_camera_local, s.position);
-  const Voxels v = voxels_at(&g, position);
-  const intv unlabelled = inside_grid(&g, v) & lack_label(s.attributes, has_color);
+  const Surfels s = load_surfels(&f.window, surfels, page_block[page], first);
+  const Points position = transformed(&f.T_camera_local, s.position);
+  const Voxels v = voxels_at(&f.grid, position);
+  const intv unlabelled = inside_grid(&f.grid, v) & lack_label(s.attributes, f.has_color);
   intv at;
-  const intv labelled = at_surface(&g, depth, column_end, limits.surface_depth, v, position.z, unlabelled, &at);
+  const intv labelled = at_surface(&f.grid, depth, column_end, f.limits.surface_depth, v, position.z, unlabelled, &at);
   int pixel[LANES];
   vstorev(at, 0, pixel);
   for (uint left = lanes & lane_bits(labelled); left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     uint attributes = surfels[first + m].w | SURFEL_OCCUPIED;
-    if (has_color && (attributes & SURFEL_COLORED) == 0) attributes = (attributes & 0xff000000u) | SURFEL_COLORED | color[pixel[m]];
+    if (f.has_color && (attributes & SURFEL_COLORED) == 0) attributes = (attributes & 0xff000000u) | SURFEL_COLORED | color[pixel[m]];
     surfels[first + m].w = attributes;
   }
 }

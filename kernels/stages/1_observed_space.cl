@@ -1,28 +1,28 @@
 // Observed space C~ - paper 3.3, eq. (9)-(11): the voxels that this frame's camera has seen to be free.
 //
 // A pixel of depth[height][width] [m] is > 0 where there is a measured surface, < 0 where nothing is met up to -depth, and 0 where there is
-// no measurement. In the pyramid the observed voxels of a column are a run that ends at its pixel's depth; in the cuboid a voxel is observed
-// iff a valid pixel's ray has its sample of that layer in it, which depends on the pixels' validity alone.
+// no measurement. In the pyramid the observed voxels of a column are a run that ends at its pixel's depth; in the cuboid a voxel is
+// observed iff a valid pixel's ray has its sample of that layer in it, which depends on the pixels' validity alone.
 
 // The first layer that each pixel's ray does not observe. One work item handles LANES pixels of a row; work item n starts at pixel
 // LANES n of rows that are filled up to image_words words of 32 pixels.
 //   in  depth[height][width] [m];  layer_depth[size_k]: z of each layer's centre [m], ascending
 //   out column_end[height][width]: layers first_pyramid_layer ... column_end - 1 are observed; 0 where there is no measurement
 //       valid[height][image_words]: a bit for each pixel that is valid; at width 1 zero before
-__kernel void column_ends(const Grid g, __global const float* depth, __global const float* layer_depth, __global int* column_end,
+__kernel void column_ends(const Frame f, __global const float* depth, __global const float* layer_depth, __global int* column_end,
                           __global uint* valid) {
-  const int chunks_in_row = 32 / LANES * image_words(&g), row = get_global_id(0) / chunks_in_row,
+  const int chunks_in_row = 32 / LANES * image_words(&f.grid), row = get_global_id(0) / chunks_in_row,
             first = LANES * (get_global_id(0) % chunks_in_row);
-  if (row >= g.height) return;
-  const intv column = first + lane_numbers(), pixel = row * g.width + min(column, g.width - 1);
+  if (row >= f.grid.height) return;
+  const intv column = first + lane_numbers(), pixel = row * f.grid.width + min(column, f.grid.width - 1);
   const floatv d = fabs(gather_float(depth, pixel));
-  const intv is_valid = MARK((d > 0.0f) & (column < g.width));
-  intv end = clamp(ceil_int(layers_at(&g, d)), 0, g.size_k);  // z(end - 1) < d <= z(end), but for rounding
+  const intv is_valid = MARK((d > 0.0f) & (column < f.grid.width));
+  intv end = clamp(ceil_int(layers_at(&f.grid, d)), 0, f.grid.size_k);  // z(end - 1) < d <= z(end), but for rounding
   end += MARK((end > 0) & (gather_float(layer_depth, max(end - 1, 0)) >= d));
-  end -= MARK((end < g.size_k) & (gather_float(layer_depth, min(end, g.size_k - 1)) < d));
+  end -= MARK((end < f.grid.size_k) & (gather_float(layer_depth, min(end, f.grid.size_k - 1)) < d));
   end = is_valid ? end : 0;
   store_lane_bits(lane_bits(is_valid), get_global_id(0), valid);
-  store_first(end, g.width - first, column_end + row * g.width + first);
+  store_first(end, f.grid.width - first, column_end + row * f.grid.width + first);
 }
 
 // Bits below bit n of a word of 32, n in 0 ... 32.
@@ -70,31 +70,31 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
   return in_image ? gather_int(column_end, t * g->width + clamp(s, 0, g->width - 1)) : 0;
 }
 
-// One work item handles LANES x SPACE_ROWS columns and a word of their layers; work item (row * words_k + w) * chunks_of(size_i) + chunk has
-// the columns from (LANES chunk, SPACE_ROWS row).
+// One work item handles LANES x SPACE_ROWS columns and a word of their layers; work item (row * words_k + w) * chunks_of(size_i) + chunk
+// has the columns from (LANES chunk, SPACE_ROWS row).
 //   in  column_end, valid: of column_ends
 //       The camera's tables for the cuboid's layers, which are filled up to whole words, and voxels to whole chunks of TABLE_CHUNK:
-//       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: first and one past the last column, row of pixels whose
-//       samples lie in each voxel, as 16-bit halves
-//       words_i[layers][chunks]: first and one past the last word of 32 pixels of each chunk's columns
+//       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: first and one past the last column, row of pixels
+//       whose samples lie in each voxel, as 16-bit halves words_i[layers][chunks]: first and one past the last word of 32 pixels of each
+//       chunk's columns
 //   out observed: bit field
-__kernel void observed_space(const Grid g, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
+__kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
-  const int chunks = chunks_of(g.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % g.words_k,
-            j = SPACE_ROWS * (get_global_id(0) / chunks / g.words_k);
-  if (j >= g.size_j) return;
+  const int chunks = chunks_of(f.grid.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % f.grid.words_k,
+            j = SPACE_ROWS * (get_global_id(0) / chunks / f.grid.words_k);
+  if (j >= f.grid.size_j) return;
   uintv low[SPACE_ROWS], high[SPACE_ROWS];
   for (int n = 0; n < SPACE_ROWS; ++n) low[n] = high[n] = 0;
-  if (64 * w < g.first_pyramid_layer) {
-    observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, 64 * w, low);
-    observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, 64 * w + 32, high);
+  if (64 * w < f.grid.first_pyramid_layer) {
+    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 64 * w, low);
+    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 64 * w + 32, high);
   }
-  for (int n = 0; n < SPACE_ROWS && j + n < g.size_j; ++n) {
-    const intv ends = ends_of_columns(&g, column_end, i, j + n);
-    low[n] |= observe_pyramid(&g, ends, 64 * w);
-    high[n] |= observe_pyramid(&g, ends, 64 * w + 32);
-    const ulongv words = (convert_ulongv(high[n]) << 32 | convert_ulongv(low[n])) & valid_layers(&g, w);
-    store_first(words, g.size_i - i, observed + word_index(&g, i, j + n, w));
+  for (int n = 0; n < SPACE_ROWS && j + n < f.grid.size_j; ++n) {
+    const intv ends = ends_of_columns(&f.grid, column_end, i, j + n);
+    low[n] |= observe_pyramid(&f.grid, ends, 64 * w);
+    high[n] |= observe_pyramid(&f.grid, ends, 64 * w + 32);
+    const ulongv words = (convert_ulongv(high[n]) << 32 | convert_ulongv(low[n])) & valid_layers(&f.grid, w);
+    store_first(words, f.grid.size_i - i, observed + word_index(&f.grid, i, j + n, w));
   }
 }
 

@@ -1,6 +1,7 @@
-// Visit of the window's surfels: all that a frame asks of them, in one pass. Which are in view, and which of these must be split - paper 3.4;
-// which are removed - eq. (12): surfels in observed space go -; and which 16_labels is to label. Voxels of surfels that stay are no candidates
-// for new ones. Ours: surfels go also where this frame has seen their back, and frontier on a sheet of unknown thinner than min_gap.
+// Visit of the window's surfels: all that a frame asks of them, in one pass. Which are in view, and which of these must be split -
+// paper 3.4; which are removed - eq. (12): surfels in observed space go -; and which 16_labels is to label. Voxels of surfels that stay are
+// no candidates for new ones. Ours: surfels go also where this frame has seen their back, and frontier on a sheet of unknown thinner than
+// min_gap.
 
 // Which of LANES surfels have an ellipsoid that may reach into the grid, generously.
 //   s: camera frame;  voxel: voxel_size at each of them
@@ -16,10 +17,10 @@ INLINE intv reach_grid(const Grid* g, const Limits* limits, const Surfels* s, fl
 
 // Which surfels this frame's view takes away, of those that are asked.
 //   s, normal: camera frame
-INLINE intv are_seen_through(const Limits* limits, const View* view, int remove_buried, __global const ushort* depths, const Surfels* s,
-                             Points normal, intv asked) {
+INLINE intv are_seen_through(const Limits* limits, const View* view, __global const ushort* depths, const Surfels* s, Points normal,
+                             intv asked) {
   intv gone = 0;
-  if (remove_buried) gone |= own_view_knows(view, depths, add_scaled(s->position, -limits->back_probe * s->radius, normal), asked);
+  if (limits->remove_buried) gone |= own_view_knows(view, depths, add_scaled(s->position, -limits->back_probe * s->radius, normal), asked);
   if (limits->min_gap > 0.0f)
     gone |= own_view_knows(view, depths, add_scaled(s->position, -limits->min_gap, normal),
                            asked & ~gone & MARK((s->attributes & SURFEL_OCCUPIED) == 0));
@@ -49,18 +50,17 @@ typedef struct {
 } PageFindings;
 
 // One work item handles LANES surfels of a page; work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
-//   in  pages[count]: those of the window;  observed: bit field C~, as 32-bit halves;  view: this frame as its own camera sees it, depths:
-//       its image, for the exact test;  depth, column_end: of 1_observed_space;  alive, page_block, surfels: the map
-//   i/o candidates: bit field by tiles, as 32-bit halves: voxels of surfels that stay are taken off
+//   in  pages[count]: those of the window;  observed: bit field C~, as 32-bit halves;  depths: images of views, this frame's among them;
+//   depth, column_end: of 1_observed_space;  alive, page_block, surfels: the map i/o candidates: bit field by tiles, as 32-bit halves:
+//   voxels of surfels that stay are taken off
 //       changed: bits of surfels that stay and that 16_labels will label are set
 //       counts[COUNTS]: COUNT_IN_VIEW, COUNT_LARGE and COUNT_REMOVED are added to
 //   out in_view[count], large[count], removed[count]: a bit for each surfel of each page
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
-    const Grid g, const Limits limits, const Window window, const Transform T_camera_local, const View view, const int remove_buried,
-    const int has_color, __global const ushort* depths, __global const float* depth, __global const int* column_end,
-    __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
-    __global const uint4* surfels, __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view,
-    __global ulong* large, __global ulong* removed, __global uint* counts) {
+    const Frame f, __global const ushort* depths, __global const float* depth, __global const int* column_end, __global const uint* pages,
+    const uint count, __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels,
+    __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view, __global ulong* large,
+    __global ulong* removed, __global uint* counts) {
   __local PageFindings of_pages[PAGE_GROUP / PAGE_ITEMS];
   const uint n = get_global_id(0) / PAGE_ITEMS, item = get_local_id(0) % PAGE_ITEMS;
   __local PageFindings* of_page = &of_pages[get_local_id(0) / PAGE_ITEMS];
@@ -70,26 +70,26 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
   const uint lanes = n < count ? lanes_of_page(alive[page], first) : 0;
   Findings found = {0, 0, 0, 0};
   if (lanes != 0) {
-    Surfels s = load_surfels(&window, surfels, page_block[page], first);
-    s.position = transformed(&T_camera_local, s.position);
-    const floatv voxel = voxel_size(&g, s.position.z);
-    const intv seen = reach_grid(&g, &limits, &s, voxel) & lane_marks(lanes);
+    Surfels s = load_surfels(&f.window, surfels, page_block[page], first);
+    s.position = transformed(&f.T_camera_local, s.position);
+    const floatv voxel = voxel_size(&f.grid, s.position.z);
+    const intv seen = reach_grid(&f.grid, &f.limits, &s, voxel) & lane_marks(lanes);
     found.in_view = lane_bits(seen);
     if (found.in_view != 0) {
-      const Voxels v = voxels_at(&g, s.position);
-      const intv inside = inside_grid(&g, v) & seen;
-      found.large = lane_bits(inside & MARK(s.radius / voxel >= limits.split_radius));
-      const intv bit = half_bits(v.k), candidate = inside ? candidate_halves(&g, v) : 0;
+      const Voxels v = voxels_at(&f.grid, s.position);
+      const intv inside = inside_grid(&f.grid, v) & seen;
+      found.large = lane_bits(inside & MARK(s.radius / voxel >= f.limits.split_radius));
+      const intv bit = half_bits(v.k), candidate = inside ? candidate_halves(&f.grid, v) : 0;
       const intv is_candidate = inside & MARK((gather_int(candidates, candidate) & bit) != 0);
       // Candidates are not observed: only the others are looked up.
-      const intv rest = inside & ~is_candidate, at = rest ? voxel_halves(&g, v) : 0;
+      const intv rest = inside & ~is_candidate, at = rest ? voxel_halves(&f.grid, v) : 0;
       intv stay = is_candidate | (rest & MARK((gather_int(observed, at) & bit) == 0));
-      const Points normal = rotated(&T_camera_local, unpack_normals(s.normal));
-      stay &= ~are_seen_through(&limits, &view, remove_buried, depths, &s, normal, stay);
+      const Points normal = rotated(&f.T_camera_local, unpack_normals(s.normal));
+      stay &= ~are_seen_through(&f.limits, &f.own_view, depths, &s, normal, stay);
       found.removed = lane_bits(inside & ~stay);
       intv pixel;
-      const intv unlabelled = stay & lack_label(s.attributes, has_color);
-      found.labelled = lane_bits(at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &pixel));
+      const intv unlabelled = stay & lack_label(s.attributes, f.has_color);
+      found.labelled = lane_bits(at_surface(&f.grid, depth, column_end, f.limits.surface_depth, v, s.position.z, unlabelled, &pixel));
       clear_candidates(candidates, candidate, bit, stay & is_candidate);
     }
   }

@@ -14,15 +14,14 @@ INLINE intv split_levels(const Grid* g, const Limits* limits, floatv z, floatv r
 // One work item handles a chunk of LANES surfels that are to be split.
 //   in  split_slots[count];  page_block, surfels: the map
 //   out children[count]: surfels that each of them is split into
-__kernel void count_children(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
-                             __global const int4* page_block, __global const uint4* surfels, __global const int* split_slots,
+__kernel void count_children(const Frame f, __global const int4* page_block, __global const uint4* surfels, __global const int* split_slots,
                              const int count, __global int* children) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist;
   const uintv slots = as_uintv(load_chunk(split_slots, count, chunk, &exist));
-  const Surfels s = surfels_at(&window, surfels, page_block, slots);
-  const intv levels = split_levels(&g, &limits, transformed(&T_camera_local, s.position).z, s.radius);
+  const Surfels s = surfels_at(&f.window, surfels, page_block, slots);
+  const intv levels = split_levels(&f.grid, &f.limits, transformed(&f.T_camera_local, s.position).z, s.radius);
   store_first((intv)(1) << (2 * levels), count - chunk * LANES, children + chunk * LANES);
 }
 
@@ -30,15 +29,15 @@ __kernel void count_children(const Grid g, const Limits limits, const Window win
 //   in  split_slots[count];  offset[count]: prefix sum of count_children's;  page_block, surfels: the map
 //   out new_surfels, new_cells: the children, packed for the map, and their cells of the window; those of surfel n start at offset[n]
 //   i/o alive, changed: of the map, as 32-bit halves
-__kernel void split(const Grid g, const Limits limits, const Window window, const Transform T_camera_local, __global const int4* page_block,
-                    __global const uint4* surfels, __global const int* split_slots, const int count, __global const int* offset,
-                    __global uint4* new_surfels, __global int* new_cells, __global uint* alive, __global uint* changed) {
+__kernel void split(const Frame f, __global const int4* page_block, __global const uint4* surfels, __global const int* split_slots,
+                    const int count, __global const int* offset, __global uint4* new_surfels, __global int* new_cells, __global uint* alive,
+                    __global uint* changed) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist;
   const intv slots = load_chunk(split_slots, count, chunk, &exist), first = load_chunk(offset, count, chunk, &exist);
-  const Surfels s = surfels_at(&window, surfels, page_block, as_uintv(slots));
-  const intv levels = split_levels(&g, &limits, transformed(&T_camera_local, s.position).z, s.radius), side = (intv)(1) << levels;
+  const Surfels s = surfels_at(&f.window, surfels, page_block, as_uintv(slots));
+  const intv levels = split_levels(&f.grid, &f.limits, transformed(&f.T_camera_local, s.position).z, s.radius), side = (intv)(1) << levels;
   const Points normal = unpack_normals(s.normal);
   const intv from_x = MARK(fabs(normal.x) < 0.6f);  // any axis that is not near the normal's
   const Points axis = {from_x ? (floatv)(1.0f) : (floatv)(0.0f), from_x ? (floatv)(0.0f) : (floatv)(1.0f), 0.0f};
@@ -51,7 +50,7 @@ __kernel void split(const Grid g, const Limits limits, const Window window, cons
     const floatv a = (column - middle) * spacing, b = (row - middle) * spacing;
     const Points p = add_scaled(add_scaled(s.position, a, x_psi), b, y_psi);
     intv cells;
-    const Quads packed = pack_surfels(&window, p, radius, normal, s.attributes, &cells);
+    const Quads packed = pack_surfels(&f.window, p, radius, normal, s.attributes, &cells);
     scatter_quads(packed, first + child, more, new_surfels);
     scatter_int(cells, first + child, more, new_cells);
     more &= MARK(child + 1 < side * side);

@@ -9,16 +9,16 @@
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
-  ulong words[TILE_COLUMNS];                // candidates
-  ulong layers;                             // that have one in any column
-  ushort entries[TILE_ENTRIES + LANES];     // the tile's candidates, VIEW_TILE_K column + layer
+  ulong words[TILE_COLUMNS];             // candidates
+  ulong layers;                          // that have one in any column
+  ushort entries[TILE_ENTRIES + LANES];  // the tile's candidates, VIEW_TILE_K column + layer
   uint entry_count;
-  float centers[TILE_CHUNKS][3][LANES];     // of the entries: x, y, z of each chunk
-  ushort open[TILE_CHUNKS];                 // entries of each chunk that are not settled, a bit each
-  ushort chunks[TILE_CHUNKS];               // that have such: work item n's are chunks[n], chunks[n + work items] ...
-  ushort views[MOST_VIEWS];                 // to be asked, in this order
+  float centers[TILE_CHUNKS][3][LANES];  // of the entries: x, y, z of each chunk
+  ushort open[TILE_CHUNKS];              // entries of each chunk that are not settled, a bit each
+  ushort chunks[TILE_CHUNKS];            // that have such: work item n's are chunks[n], chunks[n + work items] ...
+  ushort views[MOST_VIEWS];              // to be asked, in this order
   uint view_count;
-  uint likely_views;                        // of the first group: those asked because of the probes, a bit each
+  uint likely_views;  // of the first group: those asked because of the probes, a bit each
 } Tile;
 
 INLINE ulong all_bits(ulong8 words) {
@@ -198,38 +198,38 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
 //       near them
 //   i/o candidates: bit field by tiles: those that a view knows are cleared
-__kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
-                                const int view_count, __global const ushort* depths, __global const float* layer_depth,
-                                __global ushort* tile_views, __global ulong* candidates) {
+__kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
+                                __global const ushort* depths, __global const float* layer_depth, __global ushort* tile_views,
+                                __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
-  const int group = get_group_id(0), tiles_i = grid_tiles(g.size_i);
+  const int group = get_group_id(0), tiles_i = grid_tiles(f.grid.size_i);
   __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
   __local Tile own;
   load_words(own_candidates, &own);
   if (own.layers == 0) return;
 
-  int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
+  int3 tile = (int3)(group % tiles_i, group / tiles_i / f.grid.words_k, group / tiles_i % f.grid.words_k * tiles_of_word);
   for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
     if (tile_layers(own.layers, tile) == 0) continue;
     if (item == 0) {
       list_entries(&own, tile);
-      list_likely_views(&g, tile, layer_depth, views, view_lanes, depths, &own);
+      list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    ask_views(&g, tile, layer_depth, views, depths, &own);
+    ask_views(&f.grid, tile, layer_depth, views, depths, &own);
     if (own.entry_count != 0) {
       if (item == 0) keep_entries(&own, tile);
       barrier(CLK_LOCAL_MEM_FENCE);
       Box box;
-      find_candidates_box(&g, &own, tile, layer_depth, min_gap, &box);
-      __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
+      find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
+      __global ushort* own_views = tile_views + ((tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
       for (int n = item; n < view_groups; n += items)
         own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, &box);
       barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
       if (item == 0) list_views(&own, own_views, view_groups);
       barrier(CLK_LOCAL_MEM_FENCE);
-      ask_views(&g, tile, layer_depth, views, depths, &own);
+      ask_views(&f.grid, tile, layer_depth, views, depths, &own);
     }
     if (item == 0) keep_entries(&own, tile);
     barrier(CLK_LOCAL_MEM_FENCE);

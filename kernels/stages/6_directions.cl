@@ -44,25 +44,25 @@ INLINE int observed_around(const Grid* g, __global const ulong* observed, int i,
 //   out around[LANES chunks]: observed_around each candidate
 //       directions[chunks][3][LANES]: x, y and z of the normal of a surfel there, camera frame, not normalised: the sum of the unit vectors
 //       to the observed ones of the 26 voxels around it
-__kernel void find_directions(const Grid g, __global const float* layer_depth, __global const ulong* observed, __global const int* voxels,
+__kernel void find_directions(const Frame f, __global const float* layer_depth, __global const ulong* observed, __global const int* voxels,
                               const int count, __global int* around, __global float* directions) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist;
-  const Voxels v = voxels_of(&g, load_chunk(voxels, count, chunk, &exist));
+  const Voxels v = voxels_of(&f.grid, load_chunk(voxels, count, chunk, &exist));
   int i[LANES], j[LANES], k[LANES], found[LANES];
   vstorev(v.i, 0, i);
   vstorev(v.j, 0, j);
   vstorev(v.k, 0, k);
-  for (int n = 0; n < LANES; ++n) found[n] = observed_around(&g, observed, i[n], j[n], k[n]);
+  for (int n = 0; n < LANES; ++n) found[n] = observed_around(&f.grid, observed, i[n], j[n], k[n]);
   const intv bits = vloadv(0, found);
   vstorev(bits, chunk, around);
 
-  const Points center = voxel_centers(&g, layer_depth, v);
+  const Points center = voxel_centers(&f.grid, layer_depth, v);
   Points sum = {0.0f, 0.0f, 0.0f};
   for (int dk = -1; dk <= 1; ++dk) {
     LayerOffsets layer;
-    layer_around(&g, layer_depth, v, center, dk, &layer);
+    layer_around(&f.grid, layer_depth, v, center, dk, &layer);
     for (int n = 0; n < 9; ++n) {
       const intv is_set = MARK((bits & 1 << AROUND(n % 3 - 1, n / 3 - 1, dk)) != 0);
       if (!any_lane(is_set)) continue;

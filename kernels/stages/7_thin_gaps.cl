@@ -42,27 +42,27 @@ intv any_view_knows(const ViewsAround* around, __global const ushort* depths, Po
 }
 
 // One work item handles a chunk of LANES listed candidates.
-//   in  depth, column_end: of 1_observed_space;  view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of
-//       settle_candidates;  depths: their images;  voxels[count], directions: of find_directions
+//   in  depth, column_end: of 1_observed_space;  views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this
+//       frame's among them;  voxels[count], directions: of find_directions
 //   i/o candidates: bit field by tiles, as 32-bit halves: those with known space again `min_gap` behind them are cleared
-__kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, __global const ushort* tile_views,
-                         const int view_groups, __global const ushort* depths, __global const float* layer_depth,
-                         __global const float* depth, __global const int* column_end, __global const int* voxels, const int count,
-                         __global const float* directions, __global uint* candidates) {
+__kernel void close_gaps(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
+                         __global const ushort* depths, __global const float* layer_depth, __global const float* depth,
+                         __global const int* column_end, __global const int* voxels, const int count, __global const float* directions,
+                         __global uint* candidates) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist;
   const intv numbers = load_chunk(voxels, count, chunk, &exist);
-  const Voxels v = voxels_of(&g, numbers);
-  const Points center = voxel_centers(&g, layer_depth, v), direction = load_directions(directions, chunk);
-  intv pixel, open = exist & MARK(lengths(direction) >= limits.normal_min);
-  open &= ~at_surface(&g, depth, column_end, limits.surface_depth, v, center.z, open, &pixel);
+  const Voxels v = voxels_of(&f.grid, numbers);
+  const Points center = voxel_centers(&f.grid, layer_depth, v), direction = load_directions(directions, chunk);
+  intv pixel, open = exist & MARK(lengths(direction) >= f.limits.normal_min);
+  open &= ~at_surface(&f.grid, depth, column_end, f.limits.surface_depth, v, center.z, open, &pixel);
   const intv asked = open;
   if (!any_lane(open)) return;
-  const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
-  open &= ~own_view_knows(&view, depths, behind, open);
+  const Points behind = add_scaled(center, -f.limits.min_gap, normalized(direction));
+  open &= ~own_view_knows(&f.own_view, depths, behind, open);
   ViewsAround around;
-  find_views_around(&g, views, tile_views, view_groups, v, &around);
+  find_views_around(&f.grid, views, tile_views, view_groups, v, &around);
   open &= ~any_view_knows(&around, depths, behind, open);
   int closed[LANES];
   vstorev(numbers, 0, closed);

@@ -4,7 +4,8 @@
 //   e^2 = (u.n)^2 / t^2 + |u - (u.n) n|^2 / rho^2,  weight w = 1 - e where e < 1;  g_tau = <n, t_tau>
 //   |g_tau| > th_d: D_tau += sign(g_tau) w;   else, where e < 1 and |u - (u.n) n| < rho / 2: the voxel is invalid for family tau.
 // Ours: a ragged surfel (15_creation) makes voxels invalid for every family.
-// One work-group handles one tile in local memory. Its sums are integers, so the order of surfels and the number of work items do not matter.
+// One work-group handles one tile in local memory. Its sums are integers, so the order of surfels and the number of work items do not
+// matter.
 
 // Surfels as the view's grid sees them.
 //   s, normal: camera frame;   out placed[LANES]
@@ -31,17 +32,16 @@ INLINE void place_in_view(const Grid* g, const Surfels* s, Points normal, uintv 
 
 // One work item handles a chunk of LANES surfels in view.
 //   in  in_view_slots[count];  page_block, surfels: the map;   out view_surfels[count]
-__kernel void place_surfels(const Grid g, const Window window, const Transform T_camera_local, __global const int4* page_block,
-                            __global const uint4* surfels, __global const int* in_view_slots, const int count,
-                            __global ViewSurfel* view_surfels) {
+__kernel void place_surfels(const Frame f, __global const int4* page_block, __global const uint4* surfels,
+                            __global const int* in_view_slots, const int count, __global ViewSurfel* view_surfels) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist;
   const uintv slots = as_uintv(load_chunk(in_view_slots, count, chunk, &exist));
-  Surfels s = surfels_at(&window, surfels, page_block, slots);
-  s.position = transformed(&T_camera_local, s.position);
+  Surfels s = surfels_at(&f.window, surfels, page_block, slots);
+  s.position = transformed(&f.T_camera_local, s.position);
   ViewSurfel placed[LANES];
-  place_in_view(&g, &s, rotated(&T_camera_local, unpack_normals(s.normal)), slots, placed);
+  place_in_view(&f.grid, &s, rotated(&f.T_camera_local, unpack_normals(s.normal)), slots, placed);
   for (int n = 0; n < LANES && chunk * LANES + n < count; ++n) view_surfels[chunk * LANES + n] = placed[n];
 }
 
@@ -126,16 +126,16 @@ bool tile_range(const Grid* g, const Limits* limits, const ViewSurfel* s, int3* 
 // Tiles along each axis; along k they fill whole words.
 int3 tiles_of(const Grid* g) { return (int3)((g->size_i - 1) / TILE_I + 1, (g->size_j - 1) / TILE_J + 1, g->words_k * (64 / TILE_K)); }
 
-// One work item handles a surfel in view: it counts the surfels that touch each tile. Tile (i, j, k) has number (k tiles_j + j) tiles_i + i.
+// One work item handles a surfel in view: it counts the surfels that touch each tile. Tile (i, j, k) has number (k tiles_j + j) tiles_i +
+// i.
 //   i/o tile_counts[tiles], zero before
-__kernel void count_tiles(const Grid g, const Limits limits, __global const ViewSurfel* view_surfels, const uint count,
-                          __global uint* tile_counts) {
+__kernel void count_tiles(const Frame f, __global const ViewSurfel* view_surfels, const uint count, __global uint* tile_counts) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const ViewSurfel s = view_surfels[n];
-  const int3 tiles = tiles_of(&g);
+  const int3 tiles = tiles_of(&f.grid);
   int3 first, last;
-  if (!tile_range(&g, &limits, &s, &first, &last)) return;
+  if (!tile_range(&f.grid, &f.limits, &s, &first, &last)) return;
   for (int k = first.z; k <= last.z; ++k)
     for (int j = first.y; j <= last.y; ++j)
       for (int i = first.x; i <= last.x; ++i) atomic_inc(&tile_counts[(k * tiles.y + j) * tiles.x + i]);
@@ -144,14 +144,14 @@ __kernel void count_tiles(const Grid g, const Limits limits, __global const View
 // One work item handles a surfel in view: it enters it into the lists of tiles, in any order.
 //   i/o tile_cursor[tiles]: before: where the tile's list begins; after: where it ends
 //   out tile_surfels: indices into view_surfels
-__kernel void fill_tiles(const Grid g, const Limits limits, __global const ViewSurfel* view_surfels, const uint count,
-                         __global uint* tile_cursor, __global uint* tile_surfels) {
+__kernel void fill_tiles(const Frame f, __global const ViewSurfel* view_surfels, const uint count, __global uint* tile_cursor,
+                         __global uint* tile_surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const ViewSurfel s = view_surfels[n];
-  const int3 tiles = tiles_of(&g);
+  const int3 tiles = tiles_of(&f.grid);
   int3 first, last;
-  if (!tile_range(&g, &limits, &s, &first, &last)) return;
+  if (!tile_range(&f.grid, &f.limits, &s, &first, &last)) return;
   for (int k = first.z; k <= last.z; ++k)
     for (int j = first.y; j <= last.y; ++j)
       for (int i = first.x; i <= last.x; ++i) tile_surfels[atomic_inc(&tile_cursor[(k * tiles.y + j) * tiles.x + i])] = n;
@@ -295,15 +295,17 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
 // One work-group handles a tile. Tiles without a path to be walked are left as they are.
 //   in  lines: of 8_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
 //   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; they are right on the paths to be walked
-__kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(
-    const Grid g, const Limits limits, __global const uint* lines, __global const ViewSurfel* view_surfels, __global const uint* tile_begin,
-    __global const uint* tile_surfels, __global uint* events) {
+__kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(const Frame f, __global const uint* lines,
+                                                                                       __global const ViewSurfel* view_surfels,
+                                                                                       __global const uint* tile_begin,
+                                                                                       __global const uint* tile_surfels,
+                                                                                       __global uint* events) {
   __local SignFieldTile tile;
   __local NeededPaths needed;
   const int number = get_group_id(0), lane = get_local_id(0);
-  const int3 tiles = tiles_of(&g);
+  const int3 tiles = tiles_of(&f.grid);
   const int3 origin = (int3)(number % tiles.x * TILE_I, number / tiles.x % tiles.y * TILE_J, number / tiles.x / tiles.y * TILE_K);
-  if (lane == 0) load_needed(&needed, &g, lines, origin);
+  if (lane == 0) load_needed(&needed, &f.grid, lines, origin);
   barrier(CLK_LOCAL_MEM_FENCE);
 
   const bool walked = needed.any != 0;
@@ -311,17 +313,17 @@ __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint n = tile_begin[number] + lane; walked && n < tile_begin[number + 1]; n += SIGN_FIELD_GROUP) {
     const ViewSurfel s = view_surfels[tile_surfels[n]];
-    add_surfel(&tile, &needed, &limits, &s, origin);
+    add_surfel(&tile, &needed, &f.limits, &s, origin);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
 
-  const size_t plane = 2 * (size_t)g.size_i * g.size_j * g.words_k;
-  const int peak = (int)limits.peak;
+  const size_t plane = 2 * (size_t)f.grid.size_i * f.grid.size_j * f.grid.words_k;
+  const int peak = (int)f.limits.peak;
   for (int column = lane; walked && column < TILE_I * TILE_J; column += SIGN_FIELD_GROUP) {
     const int i = column / TILE_J, j = column % TILE_J;
-    if (origin.x + i >= g.size_i || origin.y + j >= g.size_j) continue;
-    __global uint* out = events + 2 * word_index(&g, origin.x + i, origin.y + j, origin.z >> 6) + ((origin.z >> 5) & 1);
-    const uint layers = (uint)bit_run(0, g.size_k - origin.z);  // those that exist
+    if (origin.x + i >= f.grid.size_i || origin.y + j >= f.grid.size_j) continue;
+    __global uint* out = events + 2 * word_index(&f.grid, origin.x + i, origin.y + j, origin.z >> 6) + ((origin.z >> 5) & 1);
+    const uint layers = (uint)bit_run(0, f.grid.size_k - origin.z);  // those that exist
     const uint touched = tile.touched[column] & layers;
     write_events(tile.i + ((i + 1) * TILE_J + j) * PADDED_K + 1, TILE_J * PADDED_K, touched, tile.invalid[0][column] & layers, peak, out,
                  plane);

@@ -115,21 +115,28 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
   // The patches of the next room must not lie across lines of the cache; and pixels are read two at a time.
   depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
-  if (depths.size() > room_size_) {
-    const double pixels = static_cast<double>(config_.recent_views + 1) * static_cast<double>(depths.size());
-    if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
-      throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
-                     " billion pixels, more than 2; raise decimation or lower recent_views.");
-    // A larger image than ever before: the kept ones are few and soon replaced.
-    clear(kept_.empty() && complete_);
-    depths_.allocate((config_.recent_views + 1) * depths.size());
-    room_size_ = depths.size();
-  }
+  if (depths.size() > room_size_) enlarge_rooms(depths.size());
+  current_ = {image.intrinsics, T_world_camera, free_room()};
+  depths_.send(std::move(depths), current_.room * room_size_);
+}
+
+/// The kept views move along with their rooms.
+void RecentViews::enlarge_rooms(std::size_t size) {
+  const std::size_t rooms = config_.recent_views + 1;
+  const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
+  if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
+    throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
+                   " billion pixels, more than 2; raise decimation or lower recent_views.");
+  std::size_t used = 0;
+  for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);
+  depths_.widen_rows(rooms, used, room_size_, size);
+  room_size_ = size;
+}
+
+std::size_t RecentViews::free_room() const {
   std::vector<bool> taken(config_.recent_views + 1, false);
   for (const Kept& kept : kept_) taken[kept.room] = true;
-  const auto room = std::find(taken.begin(), taken.end(), false) - taken.begin();
-  current_ = {image.intrinsics, T_world_camera, static_cast<std::size_t>(room)};
-  depths_.send(std::move(depths), room * room_size_);
+  return static_cast<std::size_t>(std::find(taken.begin(), taken.end(), false) - taken.begin());
 }
 
 View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const {
@@ -162,6 +169,7 @@ int RecentViews::prepare() {
 bool RecentViews::adds_something() const {
   const double cos_angle = std::cos(config_.recent_view_angle * M_PI / 180);
   return std::none_of(kept_.begin(), kept_.end(), [&](const Kept& kept) {
+    if (!same_camera(kept.intrinsics, current_.intrinsics)) return false;
     const Eigen::Isometry3d motion = kept.T_world_camera.inverse() * current_.T_world_camera;
     const double cos_turn = (motion.linear().trace() - 1) / 2;
     return motion.translation().norm() < config_.recent_view_distance && cos_turn > cos_angle;

@@ -23,7 +23,7 @@ class RecentViews {
  public:
   RecentViews(Commands& commands, const Config& config);
 
-  /// Sends this frame's depths to the device; they are own_view()'s until the next call.
+  /// Sends this frame's depths to the device; they are own_view()'s until the next call. Images may be of different sizes.
   /// @throws BadFrame  the image is too large for as many views as are kept
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
   View own_view() const;  ///< this frame's, as its own camera sees it
@@ -55,6 +55,8 @@ class RecentViews {
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool adds_something() const;
+  void enlarge_rooms(std::size_t size);
+  std::size_t free_room() const;
 
   Config config_;
   double depth_step_;          ///< [m]

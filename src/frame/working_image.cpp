@@ -104,6 +104,10 @@ std::vector<std::uint32_t> read_color(const ColorImage& image, int width, int he
 
 }  // namespace
 
+bool same_camera(const Intrinsics& a, const Intrinsics& b) {
+  return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
+}
+
 WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
   check_depth(frame.depth, config);
   check_intrinsics(frame.intrinsics, frame.depth);

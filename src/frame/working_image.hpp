@@ -15,6 +15,9 @@ struct WorkingImage {
   std::vector<std::uint32_t> color;  ///< [height][width]: red | green << 8 | blue << 16; empty if the frame has none
 };
 
+/// Are these the intrinsics of the same camera?
+bool same_camera(const Intrinsics& a, const Intrinsics& b);
+
 /// Every decimation-th pixel of both directions, nearest neighbour; intrinsics divided alike.
 /// @throws BadFrame  a sentence that names what is wrong with the frame
 WorkingImage make_working_image(const DepthFrame& frame, const Config& config);

@@ -83,9 +83,9 @@ double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_worl
 }
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
-  const double margin = window_margin(grid);
-  largest_radius_ = std::max(largest_radius_, largest_created(grid));
-  window_ = MapWindow(grid, T_world_camera, block_size_, margin, {largest_radius_, thickness_});
+  const double largest = std::max(largest_radius_, largest_created(grid));
+  window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid), {largest, thickness_});
+  largest_radius_ = largest;
   listed_cells_.clear();
   for (int cell = 0; cell < window_.cells(); ++cell) {
     const BlockKey block = window_.block(cell);
@@ -154,7 +154,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   cell_begin_.resize(cell_count + 1);
   missing_.resize(cell_count);
   order_.resize(count);
-  if (commands_.device().long_loops && count <= kFewToSort)
+  if (commands_.device().prefers_one_item && count <= kFewToSort)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
                   alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else

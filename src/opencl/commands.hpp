@@ -97,6 +97,17 @@ class DeviceArray {
     capacity_ = larger;
   }
 
+  /// Replaces rows of `old_width` elements by `rows` of `width`, nothing to spare. The first `kept` rows keep what they hold.
+  void widen_rows(std::size_t rows, std::size_t kept, std::size_t old_width, std::size_t width) {
+    const cl::Buffer bigger = commands_->allocate(rows * width * sizeof(T));
+    if (kept > 0 && old_width > 0)
+      commands_->queue().enqueueCopyBufferRect(buffer_, bigger, {0, 0, 0}, {0, 0, 0}, {old_width * sizeof(T), kept, 1},
+                                               old_width * sizeof(T), 0, width * sizeof(T), 0);
+    commands_->release(bytes());
+    buffer_ = bigger;
+    capacity_ = rows * width;
+  }
+
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);

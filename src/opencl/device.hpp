@@ -10,10 +10,14 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
-  int lanes = 1;               ///< points that one work item handles at once: 16 or 1
-  bool long_loops = false;     ///< one work item may do all of a small piece of work: llvmpipe ends loops after 65535 turns
-  bool shares_memory = false;  ///< with the host
-  std::string description;     ///< platform, name and compute units
+  int lanes = 1;                  ///< points that one work item handles at once: 16 or 1
+  bool prefers_one_item = false;  ///< a small job is done by one work item alone: PoCL takes longer for a launch; llvmpipe cannot, it ends
+                                  ///< loops after 65535 turns
+  bool shares_memory = false;     ///< with the host
+  std::string description;        ///< platform, name and compute units
+
+  /// Work items of a group where each has much to do: a CPU runs the items of a group one after the other, and waits for the last.
+  std::size_t heavy_group() const { return is_cpu ? 1 : 64; }
 };
 
 /// The device that platform, device_type, device_index and threads ask for, and how many lanes its work items have.

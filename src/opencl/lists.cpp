@@ -14,7 +14,7 @@ constexpr std::size_t kRoom = 1 << 14;
 
 Lists::Lists(Commands& commands)
     : commands_(commands),
-      few_(commands.device().long_loops ? kFewOfCpu : kFew),
+      few_(commands.device().prefers_one_item ? kFewOfCpu : kFew),
       counts_(commands),
       levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
               DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
@@ -43,7 +43,7 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
   if (count == 0) return 0;
   const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
   const auto words = static_cast<cl_uint>(count);
-  if (commands_.device().long_loops && count <= kFewWords) return list_few_bits(stage, bits, words, list);
+  if (commands_.device().prefers_one_item && count <= kFewWords) return list_few_bits(stage, bits, words, list);
   counts_.resize(chunks + 1);
   commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
   const std::uint32_t total = scan(stage, counts_, chunks);

@@ -1,4 +1,4 @@
-/// mapper_node: the mapper as a node of its own.
+/// mapper_node: the mapper as a node.
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/node_handle.h>
@@ -9,7 +9,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "mapper");
-  const ros::NodeHandle nh, pnh("~");  // outlive the mapper: with the last handle the log ends, and what is wrong would not be said
+  const ros::NodeHandle nh, pnh("~");  // must outlive the mapper: without a node handle the error below would not be logged
   try {
     const frontier_surfels::MapperRos mapper(nh, pnh);
     ros::spin();

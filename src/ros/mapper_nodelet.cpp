@@ -14,7 +14,7 @@ class MapperNodelet : public nodelet::Nodelet {
       mapper_ = std::make_unique<MapperRos>(getNodeHandle(), getPrivateNodeHandle());
     } catch (const std::exception& error) {
       NODELET_FATAL("%s", error.what());
-      throw;  // so that the manager says that loading has failed
+      throw;  // so that the manager reports that loading failed
     }
   }
 

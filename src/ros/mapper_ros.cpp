@@ -16,7 +16,7 @@
 
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/ply.hpp"
-#include "ros/input/frame_reader.hpp"
+#include "ros/input/camera_input.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
@@ -36,6 +36,16 @@ NodeConfig read_and_warn(const ros::NodeHandle& pnh) {
 
 Eigen::Vector3f to_vector(const geometry_msgs::Point& p) { return Eigen::Vector3d(p.x, p.y, p.z).cast<float>(); }
 
+/// The cameras of a mapper.
+const CameraTopics kCameras[] = {{"depth/image", "depth/camera_info", "color/image"}};
+
+/// The topics of all depth images, for people.
+std::string depth_topics(const ros::NodeHandle& nh) {
+  std::string topics;
+  for (const CameraTopics& camera : kCameras) topics += (topics.empty() ? "" : ", ") + nh.resolveName(camera.depth);
+  return topics;
+}
+
 }  // namespace
 
 class MapperRos::Impl {
@@ -44,15 +54,14 @@ class MapperRos::Impl {
   ~Impl();
 
  private:
-  // Callbacks of the inputs
-  void on_depth(const DepthArrival& arrival);
+  void report_dropped(const DroppedImage& image);
 
-  // On the worker's thread
-  void process(const DepthArrival& arrival);
-  bool has_jumped_back(const std_msgs::Header& header);
-  void start_again(const ros::Time& stamp);
+  // On the mapping thread
+  bool map_next();
+  void map(CameraInput& camera, const CompleteImage& image);
+  FrameReport integrate(CameraInput& camera, const CompleteImage& image);
+  void start_again(const ros::Time& from, const ros::Time& to);
   void publish_changes();
-  void report_dropped(const DepthArrival& arrival, std::uint8_t result, const std::string& reason);
 
   // Services
   void start_services();
@@ -68,41 +77,36 @@ class MapperRos::Impl {
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
-  Mapper mapper_;  // the worker's alone
+  Mapper mapper_;   // only used by the mapping thread
+  MapState state_;  // only used by the mapping thread
   FramePoses poses_;
-  MapState state_;
-  ros::Time last_stamp_, last_now_;
-  bool clock_went_back_ = false;  ///< since the last frame that was mapped
-  std::atomic<bool> paused_{false};
-  std::atomic<bool> stopping_{false};
   std::atomic<std::uint32_t> surfels_{0};  ///< in the map, for reports of frames that are not mapped
   std::atomic<std::uint64_t> sequence_{0};
 
   ros::Publisher reports_;
   std::unique_ptr<MapPublisher> publisher_;
-  std::unique_ptr<Worker<DepthArrival>> worker_;
-  std::unique_ptr<FrameInput> input_;
-  std::unique_ptr<FrameReader> reader_;
+  std::unique_ptr<Worker> worker_;
+  std::vector<std::unique_ptr<CameraInput>> cameras_;
   std::unique_ptr<MapperDiagnostics> diagnostics_;
-  ros::CallbackQueue service_queue_;  // a service waits for the frame at hand: it must not hold up the images
+  ros::CallbackQueue service_queue_;  // its own, because services wait for the current frame and must not hold up the images
   ros::NodeHandle service_nh_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
 };
 
 MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
-    : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(nh, config_.world_frame), service_nh_(pnh) {
+    : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame), service_nh_(pnh) {
   reports_ = pnh_.advertise<FrameReport>("report", 100);
-  worker_ =
-      std::make_unique<Worker<DepthArrival>>([this](const DepthArrival& arrival) { process(arrival); }, [this] { publish_changes(); });
+  worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { publish_changes(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
-  input_ = std::make_unique<FrameInput>(nh_, config_);
-  reader_ = std::make_unique<FrameReader>(config_, *input_, poses_, [this] { return stopping_.load(); });
-  diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), nh_.resolveName("depth/image"));
-  start_services();
+  const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
+  for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
+  diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
+  poses_.start(nh_);
+  for (const auto& camera : cameras_) camera->start(nh_);
   worker_->start();
-  input_->start([this](const DepthArrival& arrival) { on_depth(arrival); });
-  ROS_INFO("Mapping %s in the frame %s on %s.", input_->depth_topic().c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
+  start_services();
+  ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
 }
 
 void MapperRos::Impl::start_services() {
@@ -117,84 +121,83 @@ void MapperRos::Impl::start_services() {
 }
 
 MapperRos::Impl::~Impl() {
-  stopping_ = true;
-  worker_->stop();  // it asks the inputs while it waits
-  input_.reset();
+  worker_->stop();  // first, because it asks the cameras
+  cameras_.clear();
   service_spinner_->stop();
   publisher_.reset();
 }
 
-void MapperRos::Impl::on_depth(const DepthArrival& arrival) {
-  if (paused_) return report_dropped(arrival, FrameReport::DROPPED_PAUSED, "Mapping is paused: call ~pause with false to go on.");
-  if (const auto replaced = worker_->put(arrival)) {
-    report_dropped(*replaced, FrameReport::DROPPED_QUEUE, "A newer depth image came before this one's turn.");
-  }
-}
-
-void MapperRos::Impl::report_dropped(const DepthArrival& arrival, std::uint8_t result, const std::string& reason) {
+void MapperRos::Impl::report_dropped(const DroppedImage& image) {
   FrameReport message;
-  message.header = arrival.image.header();
-  message.result = result;
-  message.reason = reason;
+  message.header = image.arrival.image.header();
+  message.result = image.result;
+  message.reason = image.reason;
   message.surfels = surfels_;
   message.sequence = sequence_;
-  message.latency_ms = message.wait_ms = ms_since(arrival.time);
+  message.latency_ms = message.wait_ms = ms_since(image.arrival.time);
   reports_.publish(message);
   diagnostics_->add(message);
 }
 
-void MapperRos::Impl::process(const DepthArrival& arrival) {
-  const std_msgs::Header& header = arrival.image.header();
-  try {
-    const bool time_jumped = has_jumped_back(header);
-    const replay::RecordedFrame frame = reader_->read(arrival.image);
-    // Only now: an image of a senseless stamp has no pose, and must not cost the map.
-    if (time_jumped) start_again(header.stamp);
-    last_stamp_ = header.stamp;
-    clock_went_back_ = false;
-    const double wait_ms = ms_since(arrival.time);
-    const Report report = mapper_.integrate(frame.view());
-    surfels_ = static_cast<std::uint32_t>(report.surfels);
-    sequence_ = report.sequence;
-    state_ = {header.stamp, CameraView{frame.T_world_camera, frame.intrinsics, config_.mapper.z_max}};
-
-    FrameReport message = messages::to_message(report);
-    message.header = header;
-    message.result = FrameReport::INTEGRATED;
-    message.wait_ms = wait_ms;
-    message.latency_ms = ms_since(arrival.time);
-    reports_.publish(message);
-    diagnostics_->add(message);
-    diagnostics_->set_memory(report.map_bytes, report.device_bytes);
-  } catch (const DroppedFrame& fault) {
-    report_dropped(arrival, fault.result, fault.what());
-  } catch (const BadFrame& fault) {
-    report_dropped(arrival, FrameReport::DROPPED_BAD_IMAGE, fault.what());
-  } catch (const std::exception& fault) {
-    report_dropped(arrival, FrameReport::FAILED, fault.what());
+/// Maps the earliest image that is ready, of whichever camera. @return false if there is none
+bool MapperRos::Impl::map_next() {
+  CameraInput* next = nullptr;
+  std::optional<ros::Time> earliest;
+  for (const auto& camera : cameras_) {
+    const std::optional<ros::Time> stamp = camera->next_stamp();
+    if (!stamp || (earliest && *stamp >= *earliest)) continue;
+    next = camera.get();
+    earliest = stamp;
   }
-}
-
-/// A stamp before the last one's: time has jumped, as in a bag that loops, or the image is merely late. tf must forget the old time at
-/// once, or it would take no transforms of the new one.
-bool MapperRos::Impl::has_jumped_back(const std_msgs::Header& header) {
-  constexpr double kLate = 1;  // [s]; more is no delay of transport
-  const ros::Time now = ros::Time::now();
-  clock_went_back_ = clock_went_back_ || now < last_now_;
-  last_now_ = now;
-  if (header.stamp.isZero() || header.stamp >= last_stamp_) return false;
-  if (!clock_went_back_ && messages::seconds(header.stamp, last_stamp_) <= kLate)
-    throw DroppedFrame(FrameReport::DROPPED_OUT_OF_ORDER, "A depth image is older than the one before it: images must come in order.");
-  poses_.forget_future(header.frame_id, header.stamp);
-  input_->forget_future(header.stamp);
+  if (next == nullptr) return false;
+  if (const std::optional<CompleteImage> image = next->take()) map(*next, *image);
   return true;
 }
 
-void MapperRos::Impl::start_again(const ros::Time& stamp) {
+void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
+  const auto drop = [&](std::uint8_t result, const std::string& reason) { report_dropped({image.arrival, result, reason}); };
+  try {
+    const FrameReport message = integrate(camera, image);
+    reports_.publish(message);
+    diagnostics_->add(message);
+    diagnostics_->set_memory(message.map_bytes, message.device_bytes);
+  } catch (const DroppedFrame& fault) {
+    drop(fault.result, fault.what());
+  } catch (const BadFrame& fault) {
+    drop(FrameReport::DROPPED_BAD_IMAGE, fault.what());
+  } catch (const std::exception& fault) {
+    drop(FrameReport::FAILED, fault.what());
+  }
+}
+
+FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage& image) {
+  const std_msgs::Header& header = image.arrival.image.header();
+  const CameraFrame pixels(image);
+  const DepthFrame frame = pixels.view();
+  // The camera lets an earlier stamp through only if time has jumped back.
+  if (header.stamp < camera.last_mapped()) start_again(camera.last_mapped(), header.stamp);
+  camera.set_last_mapped(header.stamp);
+  const double wait_ms = ms_since(image.arrival.time);
+  const Report report = mapper_.integrate(frame);
+  surfels_ = static_cast<std::uint32_t>(report.surfels);
+  sequence_ = report.sequence;
+  state_ = {header.stamp, CameraView{frame.T_world_camera, frame.intrinsics, config_.mapper.z_max}};
+
+  FrameReport message = messages::to_message(report);
+  message.header = header;
+  message.result = FrameReport::INTEGRATED;
+  message.wait_ms = wait_ms;
+  message.latency_ms = ms_since(image.arrival.time);
+  return message;
+}
+
+/// Time has jumped back, for all cameras: an image of another one must not reset the map once more.
+void MapperRos::Impl::start_again(const ros::Time& from, const ros::Time& to) {
   const bool reset = config_.on_time_jump == "reset";
-  ROS_WARN("Time has jumped back by %.1f s: old transforms are forgotten, and the map is %s (~on_time_jump).",
-           messages::seconds(stamp, last_stamp_), reset ? "reset" : "kept");
+  ROS_WARN("Time has jumped back by %.1f s: old transforms are forgotten, and the map is %s (~on_time_jump).", messages::seconds(to, from),
+           reset ? "reset" : "kept");
   if (reset) mapper_.reset();
+  for (const auto& camera : cameras_) camera->set_last_mapped(std::min(camera->last_mapped(), to));
 }
 
 void MapperRos::Impl::publish_changes() {
@@ -213,7 +216,7 @@ void MapperRos::Impl::serve(const std::string& name, bool (Impl::*handler)(typen
   services_.push_back(service_nh_.advertiseService(name, handler, this));
 }
 
-/// Runs the job, which returns the sentence of success, and tells its outcome. @return false if the mapper is shutting down
+/// Runs the job, and fills the response with the sentence that it returns or throws. @return false if the mapper is shutting down
 template <typename Response, typename Job>
 bool MapperRos::Impl::answer(Response& response, Job job) {
   try {
@@ -235,27 +238,26 @@ bool MapperRos::Impl::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Resp
       mapper_.reset();
       surfels_ = 0;
       sequence_ = mapper_.sequence();
-      last_stamp_ = last_now_ = ros::Time();
-      input_->forget_future(ros::Time());  // what comes next may be of any time
+      for (const auto& camera : cameras_) camera->reset();
     });
     return std::string("The map is empty.");
   });
 }
 
 bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
-  paused_ = request.data;
+  for (const auto& camera : cameras_) camera->pause(request.data);
   diagnostics_->set_paused(request.data);
   response.success = true;
-  response.message = request.data ? "Mapping is paused." : "Mapping goes on.";
+  response.message = request.data ? "Mapping is paused." : "Mapping continues.";
   return true;
 }
 
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
-    if (request.path.empty()) throw FileError("No path was given: give that of the PLY file to be written.");
+    if (request.path.empty()) throw FileError("No path was given: give the path of the PLY file to be written.");
     const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
-    write_ply(request.path, surfels);  // takes time, but not the mapper's
-    return std::to_string(surfels.size()) + " surfels are in " + request.path + ".";
+    write_ply(request.path, surfels);  // on this thread, so that mapping goes on
+    return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
   });
 }
 
@@ -277,8 +279,8 @@ bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Resp
       response.sequence = mapper_.sequence();
       return box.min() == box.max() ? mapper_.surfels() : mapper_.surfels(box);
     });
-    response.surfels = messages::to_cloud(surfels);
-  } catch (const std::exception& fault) {  // a service has no other way to say it
+    response.surfels = messages::to_cloud(surfels, config_.confident_label());
+  } catch (const std::exception& fault) {  // the response has no field for it
     ROS_WARN("~get_surfels cannot be answered: %s", fault.what());
     return false;
   }

@@ -1,4 +1,4 @@
-/// The mapper among ROS nodes: one class behind the nodelet and the node.
+/// The mapper with its ROS interface: the class that both the nodelet and the node contain.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -7,14 +7,14 @@
 
 namespace frontier_surfels {
 
-/// Inputs are relative to `nh`, outputs, services and parameters to `pnh`. Callbacks of `nh`'s queue only store what arrives; a thread of
-/// its own maps, another one publishes, a third one answers services.
+/// Names of inputs are relative to `nh`; those of outputs, services and parameters to `pnh`. Callbacks in the queue of `nh` only store what
+/// arrives. Separate threads look for what waiting images lack, map, publish, and answer services.
 class MapperRos {
  public:
-  /// Reads the parameters, builds the mapper, subscribes.
-  /// @throws Error  with every fault of the parameters; DeviceError
+  /// Reads the parameters, builds the mapper and subscribes its inputs.
+  /// @throws Error with every fault of the parameters, DeviceError
   MapperRos(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
-  ~MapperRos();  ///< ends after the frame that is being mapped
+  ~MapperRos();  ///< returns after the current frame
 
  private:
   class Impl;

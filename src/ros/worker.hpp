@@ -1,32 +1,31 @@
-/// The thread that alone touches the mapper: the newest frame, and jobs in between.
+/// The mapping thread, which alone touches the mapper.
 #pragma once
 
 #include <condition_variable>
 #include <deque>
 #include <functional>
 #include <future>
+#include <memory>
 #include <mutex>
-#include <optional>
 #include <thread>
+#include <utility>
 
 namespace frontier_surfels {
 
-/// @tparam Frame  only the newest one waits; a frame that is replaced is handed back to whoever brought the newer one
-template <typename Frame>
+/// Maps one frame after the other, and runs jobs in between.
 class Worker {
  public:
-  /// @param on_frame  maps a frame
-  /// @param after     called after every frame, job and wake()
-  Worker(std::function<void(const Frame&)> on_frame, std::function<void()> after)
-      : on_frame_(std::move(on_frame)), after_(std::move(after)) {}
+  /// @param map_next  maps the next frame; returns false if none is ready
+  /// @param after     called after every frame, every job and every wake()
+  Worker(std::function<bool()> map_next, std::function<void()> after) : map_next_(std::move(map_next)), after_(std::move(after)) {}
   ~Worker() { stop(); }
 
-  /// Begins; what has come before waits.
+  /// Starts the thread. A wake() before this is not lost.
   void start() {
     thread_ = std::thread([this] { run(); });
   }
 
-  /// Ends after the frame or job at hand; jobs that wait are dropped, and their callers told so.
+  /// Stops after the current frame or job. Callers of waiting jobs get std::future_error.
   void stop() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -34,22 +33,11 @@ class Worker {
     }
     changed_.notify_all();
     if (thread_.joinable()) thread_.join();
-    jobs_.clear();  // breaks the promises of those that wait
+    jobs_.clear();  // breaks the promises of waiting jobs
   }
 
-  /// Leaves a frame. @return the one that waited and is now dropped
-  std::optional<Frame> put(Frame frame) {
-    std::optional<Frame> replaced;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      replaced = std::move(waiting_);
-      waiting_ = std::move(frame);
-    }
-    changed_.notify_all();
-    return replaced;
-  }
-
-  /// Runs a job between frames and waits for it; what it throws is thrown here. @throws std::future_error if the worker has been stopped
+  /// Runs a job between two frames and waits for it. What the job throws is thrown here.
+  /// @throws std::future_error if the worker has been stopped
   template <typename Job>
   auto run_job(Job job) -> decltype(job()) {
     auto task = std::make_shared<std::packaged_task<decltype(job())()>>(std::move(job));
@@ -64,7 +52,7 @@ class Worker {
     return result.get();
   }
 
-  /// Has `after` called once, even if no frame comes.
+  /// Has the thread map the frames that are ready, and call `after` at least once.
   void wake() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -77,32 +65,31 @@ class Worker {
   void run() {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
-      changed_.wait(lock, [this] { return stopping_ || woken_ || waiting_ || !jobs_.empty(); });
+      changed_.wait(lock, [this] { return stopping_ || woken_ || !jobs_.empty(); });
       if (stopping_) return;
-      woken_ = false;
-      if (!jobs_.empty()) {
-        const auto job = std::move(jobs_.front());
-        jobs_.pop_front();
-        lock.unlock();
-        job();
-      } else if (waiting_) {
-        const Frame frame = std::move(*waiting_);
-        waiting_.reset();
-        lock.unlock();
-        on_frame_(frame);
+      std::function<void()> job;
+      if (jobs_.empty()) {
+        woken_ = false;
       } else {
-        lock.unlock();
+        job = std::move(jobs_.front());
+        jobs_.pop_front();
       }
+      lock.unlock();
+      bool is_more_ready = false;
+      if (job)
+        job();
+      else
+        is_more_ready = map_next_();
       after_();
       lock.lock();
+      woken_ = woken_ || is_more_ready;
     }
   }
 
-  const std::function<void(const Frame&)> on_frame_;
+  const std::function<bool()> map_next_;
   const std::function<void()> after_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<Frame> waiting_;
   std::deque<std::function<void()>> jobs_;
   bool stopping_ = false, woken_ = false;
   std::thread thread_;

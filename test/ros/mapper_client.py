@@ -1,4 +1,4 @@
-"""A camera, and a running mapper's topics and services, for the rostests: a case should be a few lines."""
+"""A camera, and the topics and services of a running mapper, so that a case of a rostest is a few lines."""
 import contextlib
 import itertools
 import threading
@@ -16,9 +16,10 @@ from tf2_msgs.msg import TFMessage
 
 from synthetic_camera import Camera, header_of, pose, raw_image, transform
 
-TIMEOUT = 30  # [s] for what happens at once on a machine with nothing else to do
-FORMATS = {2: 'u1', 6: '<u4', 7: '<f4'}  # of sensor_msgs/PointField
-FIELDS = ['x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'radius', 'label', 'rgb', 'id']
+TIMEOUT = 30  # [s] for what takes no time on an idle machine
+FORMATS = {6: '<u4', 7: '<f4'}  # of sensor_msgs/PointField
+FIELDS = ['x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'label', 'rgb', 'radius', 'confidence', 'curvature', 'id']
+NO_COLOR = 1 << 24  # in rgb: the colour is only for show
 
 
 def wait_until(condition, timeout=TIMEOUT, what='something'):
@@ -35,7 +36,7 @@ def wait_until(condition, timeout=TIMEOUT, what='something'):
 
 @contextlib.contextmanager
 def case(name):
-    """Like unittest's subTest, which rostest does not understand; but the first failure is the last."""
+    """Like unittest's subTest, which rostest does not support, except that the first failure ends the test."""
     try:
         yield
     except AssertionError as fault:
@@ -43,7 +44,7 @@ def case(name):
 
 
 def to_array(cloud):
-    """A cloud of surfels as a structured array ordered by id; colours as whole numbers."""
+    """A cloud of surfels as a structured array ordered by id, with rgb as a whole number."""
     formats = {field.name: (FORMATS[field.datatype], field.offset) for field in cloud.fields}
     assert sorted(formats) == sorted(FIELDS), formats
     formats['rgb'] = ('<u4', formats['rgb'][1])
@@ -56,12 +57,17 @@ def to_array(cloud):
 
 
 def without_ids(surfels):
-    """For equal maps that came about in different ways."""
+    """For comparing maps that must be equal but were made in different ways."""
     return numpy.sort(surfels[FIELDS[:-1]])
 
 
+def has_color(surfels):
+    """For every surfel of an array: whether its colour was seen."""
+    return surfels['rgb'] & NO_COLOR == 0
+
+
 class CameraTopics:
-    """Publishes what a depth camera and its localisation would. A new `frame` for every case: tf forgets nothing else."""
+    """Publishes what a depth camera and its localisation publish. Every case uses a new `frame`, because tf remembers the old ones."""
 
     counter = itertools.count()
 
@@ -76,7 +82,7 @@ class CameraTopics:
         self.new_frame()
 
     def raw(self):
-        """Without which nothing is mapped."""
+        """The publishers without which nothing is mapped."""
         return self.depth, self.info, self.tf
 
     def new_frame(self):
@@ -86,7 +92,7 @@ class CameraTopics:
         self.tf.publish(TFMessage([transform(T_world_camera, parent or self.world, child or self.frame, stamp)]))
 
     def send(self, step, stamp=None, send_pose=True, message=None, color=None):
-        """Pose, camera_info, colour and image of one step of the walk, or another image. Returns the header."""
+        """Sends pose, camera_info, colour and depth image of one step of the walk; `message` replaces the depth image. Returns the header."""
         header = header_of(self.frame, stamp)
         if send_pose:
             self.send_pose(pose(step), header.stamp)
@@ -101,10 +107,10 @@ class CameraTopics:
 
 
 class Mapper:
-    """The outside of a mapper node."""
+    """A mapper node, seen through its topics and services."""
 
     def __init__(self, name='mapper', process=None):
-        """`process`: the nodelet manager that it lives in, if it is not a node."""
+        """`process`: the node that it runs in, if it is a nodelet."""
         self.name, self.process, self.reports, self.changed = name, process or name, [], threading.Condition()
         self.subscriber = rospy.Subscriber(f'{name}/report', FrameReport, self.add_report, queue_size=100)
 
@@ -114,13 +120,13 @@ class Mapper:
             self.changed.notify_all()
 
     def report(self, header, timeout=TIMEOUT):
-        """What became of the image with that header."""
+        """The report on the image with that header."""
         def find():
             return next((report for report in reversed(self.reports)
                          if (report.header.stamp, report.header.frame_id) == (header.stamp, header.frame_id)), None)
 
         with self.changed:
-            assert self.changed.wait_for(find, timeout), f'{self.name} said nothing of the image of {header.stamp.to_sec():.3f}'
+            assert self.changed.wait_for(find, timeout), f'{self.name} reported nothing on the image of {header.stamp.to_sec():.3f}'
             return find()
 
     def call(self, service, kind, *arguments):
@@ -140,7 +146,7 @@ class Mapper:
         return self.call('load_map', MapFile, str(path))
 
     def map(self, box=((0, 0, 0), (0, 0, 0))):
-        """Number of the map, and its surfels."""
+        """The sequence number of the map, and its surfels."""
         request = GetSurfelsRequest()
         for point, corner in zip((request.box_min, request.box_max), box):
             point.x, point.y, point.z = corner
@@ -151,16 +157,16 @@ class Mapper:
         return self.map()[1]
 
     def wait_until_connected(self, *publishers):
-        """Every publisher reaches this mapper, and it reaches us."""
+        """Waits until every publisher is connected to this mapper, and the mapper to this node."""
         wait_until(lambda: self.subscriber.get_num_connections() > 0, what=f'the reports of {self.name}')
         for publisher in publishers:
             wait_until(lambda: '/' + self.process in [connection.endpoint_id for connection in publisher.impl.connections],
                        what=f'{self.name} to listen to {publisher.name}')
-        self.map()  # it answers
+        self.map()  # waits until it answers
 
 
 class MapperTest(unittest.TestCase):
-    """Cases with one camera, and one mapper that starts empty."""
+    """Base of cases with one camera and one mapper, whose map is empty when a case begins."""
 
     @classmethod
     def setUpClass(cls):
@@ -178,16 +184,16 @@ class MapperTest(unittest.TestCase):
         return report
 
     def check_dropped(self, header, result, reason, mapper=None):
-        """And the map is as it was."""
+        """The image was dropped for this reason. Returns the report."""
         mapper = mapper or self.mapper
         report = mapper.report(header)
         self.assertEqual(report.result, result, report.reason)
         self.assertRegex(report.reason, reason)
-        self.assertRegex(report.reason, r'^[^\n]+\.$')  # a sentence
+        self.assertRegex(report.reason, r'^[^\n]+\.$')  # it is a sentence
         return report
 
     def map_walk(self, steps=4, first=0):
-        """Maps so many steps, one after the other; returns the last report."""
+        """Maps this number of steps one after the other. Returns the last report."""
         for step in range(first, first + steps):
             report = self.check_integrated(self.camera.send(step))
         return report
@@ -204,6 +210,6 @@ class MapperTest(unittest.TestCase):
 
 
 def run(name, case):
-    """The main program of a rostest."""
+    """Runs a rostest."""
     rospy.init_node(name)
     rostest.rosrun('frontier_surfels', name, case)

@@ -1,4 +1,4 @@
-/// What somebody sees who applies the markers: rviz without a window.
+/// What a subscriber of ~markers sees: rviz without a window.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using visualization_msgs::MarkerArray;
 
 inline Eigen::Vector3d to_vector(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
 
-/// A square as it is seen.
+/// A square that is shown.
 struct Square {
   Label label;
   Eigen::Vector3d center, normal;
@@ -29,7 +29,7 @@ struct Square {
   std_msgs::ColorRGBA color;
 };
 
-/// How far a surfel's centre lies outside of the square, at most 0 if it is within.
+/// Distance of a surfel's centre from the square, in its plane; at most 0 if the centre is inside.
 inline double distance(const Surfel& surfel, const Square& square) {
   const Eigen::Vector3d to_surfel = surfel.position.cast<double>() - square.center;
   const Eigen::Vector3d u = (square.corner - square.center).normalized(), v = square.normal.cross(u);  // diagonals
@@ -37,17 +37,17 @@ inline double distance(const Surfel& surfel, const Square& square) {
   return std::max(along, std::abs(to_surfel.dot(square.normal)) - 1e-5);
 }
 
-/// All markers out there. Complains of what rviz would not show, or show wrongly.
+/// All markers that are shown. Markers that rviz would not show, or would show wrongly, are failures of the test.
 class Scene {
  public:
-  /// @param block  edge of the cubes that markers must keep within [m]
+  /// @param block  edge of the cubes within which every marker must lie [m]
   void apply(const MarkerArray& message, double block = 0.5) {
     for (const Marker& marker : message.markers) {
       EXPECT_EQ(marker.header.frame_id, "map");
       EXPECT_TRUE(marker.lifetime.isZero());
       const auto key = std::make_pair(marker.ns, marker.id);
       if (marker.action == Marker::DELETEALL) {
-        EXPECT_EQ(&marker, &message.markers.front()) << "what comes before is lost";
+        EXPECT_EQ(&marker, &message.markers.front()) << "rviz deletes the markers before it as well";
         markers_.clear();
       } else if (marker.action == Marker::DELETE) {
         EXPECT_EQ(markers_.erase(key), 1U) << "there was no " << marker.ns << " " << marker.id;

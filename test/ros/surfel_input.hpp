@@ -1,4 +1,4 @@
-/// Surfels and changes for the tests of what is published.
+/// Random surfels and changes for the tests of the outputs.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ using Rng = std::mt19937;
 
 inline float uniform(Rng& rng, float low, float high) { return std::uniform_real_distribution<float>(low, high)(rng); }
 
-/// A surfel within `extent` metres of the origin; one in three without colour.
+/// A surfel whose coordinates are at most `extent` metres; every third one has no colour.
 inline Surfel random_surfel(Rng& rng, std::uint32_t id, float extent = 2) {
   Surfel surfel;
   for (int axis = 0; axis < 3; ++axis) {
@@ -31,14 +31,14 @@ inline Surfel random_surfel(Rng& rng, std::uint32_t id, float extent = 2) {
   return surfel;
 }
 
-/// Surfels 0 ... count - 1.
+/// Surfels with the ids 0 ... count - 1.
 inline std::vector<Surfel> random_surfels(Rng& rng, std::size_t count, float extent = 2) {
   std::vector<Surfel> surfels;
   for (std::size_t id = 0; id < count; ++id) surfels.push_back(random_surfel(rng, static_cast<std::uint32_t>(id), extent));
   return surfels;
 }
 
-/// Changes of the map number `since`, of at most `count` of the ids 0 ... ids - 1: no id is both updated and removed.
+/// Changes of the map with the number `since`. At most `count` of the ids 0 ... ids - 1 are updated or removed, none of them both.
 inline Changes random_changes(Rng& rng, std::uint64_t since, std::uint32_t ids, int count) {
   std::set<std::uint32_t> changed;
   for (int n = 0; n < count; ++n) changed.insert(static_cast<std::uint32_t>(rng() % ids));

@@ -1,4 +1,4 @@
-"""Depth images of a room that is known exactly, and its messages, for the rostests."""
+"""Depth images of a room whose geometry is known exactly, and their messages, for the rostests."""
 import functools
 import io
 
@@ -8,7 +8,7 @@ from PIL import Image as Picture
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-ROOM = ((-3.0, -2.5, 0.0), (2.5, 2.5, 2.6))  # seen from inside [m]
+ROOM = ((-3.0, -2.5, 0.0), (2.5, 2.5, 2.6))  # two corners; the camera is inside [m]
 BOXES = [((0.9, -0.6, 0.0), (1.5, 0.4, 0.9)), ((0.2, 0.7, 0.0), (0.8, 1.3, 1.6)), ((1.6, 0.9, 0.4), (2.2, 1.5, 1.1))]
 BACK = 1000
 
@@ -26,11 +26,11 @@ class Camera:
                           P=[self.f, 0, self.cx, 0, 0, self.f, self.cy, 0, 0, 0, 1, 0])
 
     def depth(self, step):
-        """What it sees at a step of the walk: millimetres as uint16."""
+        """The depth image at a step of the walk: millimetres as uint16."""
         return render(self.width, self.height, step)
 
     def color(self):
-        """Every pixel another one, none black."""
+        """A colour image without black pixels, in which neighbouring pixels differ."""
         columns, rows = numpy.meshgrid(numpy.arange(self.width), numpy.arange(self.height))
         return numpy.stack([50 + columns % 200, 50 + rows % 200, 200 - columns % 100], axis=-1).astype(numpy.uint8)
 
@@ -58,7 +58,7 @@ def crossings(box, origin, rays):
 
 
 def pose(step):
-    """T_world_camera of a hand-held walk along the room, looking along x; from step BACK on the same way, looking back."""
+    """T_world_camera of a hand-held walk through the room, looking along x. From step BACK on it is the same walk, looking back."""
     yaw, pitch = 0.25 * numpy.sin(0.5 * step) + (numpy.pi if step >= BACK else 0), 0.15
     forward = numpy.array([numpy.cos(yaw) * numpy.cos(pitch), numpy.sin(yaw) * numpy.cos(pitch), -numpy.sin(pitch)])
     right = numpy.array([numpy.sin(yaw), -numpy.cos(yaw), 0.0])
@@ -74,13 +74,13 @@ def transform(T_parent_child, parent, child, stamp):
     t, q = message.transform.translation, message.transform.rotation
     t.x, t.y, t.z = T_parent_child[:3, 3]
     R = T_parent_child[:3, :3]
-    q.w = numpy.sqrt(max(0.0, 1 + numpy.trace(R))) / 2  # the poses above are no half turns
+    q.w = numpy.sqrt(max(0.0, 1 + numpy.trace(R))) / 2  # is not 0, because no pose above is a half turn
     q.x, q.y, q.z = ((R[k, j] - R[j, k]) / (4 * q.w) for j, k in ((1, 2), (2, 0), (0, 1)))
     return message
 
 
 def raw_image(array, encoding, header, big_endian=False, padding=0):
-    """Rows of `array`, each with so many bytes behind it that are no pixels."""
+    """An image of the rows of `array`, each of them followed by `padding` bytes that are no pixels."""
     if array.dtype.itemsize > 1:
         array = array.astype(array.dtype.newbyteorder('>' if big_endian else '<'))
     rows = numpy.ascontiguousarray(array).view(numpy.uint8).reshape(len(array), -1)
@@ -90,12 +90,12 @@ def raw_image(array, encoding, header, big_endian=False, padding=0):
 
 
 def metres(millimetres):
-    """REP 118: no measurement is NaN."""
+    """Depth in metres, with NaN where there is no measurement (REP 118)."""
     return numpy.where(millimetres == 0, numpy.nan, millimetres.astype(numpy.float32) / numpy.float32(1000)).astype(numpy.float32)
 
 
 def compressed_depth(millimetres, header):
-    """As compressed_depth_image_transport: 12 bytes, then a PNG."""
+    """The message that compressed_depth_image_transport makes: 12 bytes, then a PNG."""
     return CompressedImage(header=header, format='16UC1; compressedDepth', data=bytes(12) + png(millimetres))
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Under /clock: a bag that loops, and images that are merely late or have impossible stamps."""
+"""With /clock: a bag that loops, images that are merely late, and images with impossible stamps."""
 import time
 
 import rospy
@@ -9,7 +9,7 @@ from rosgraph_msgs.msg import Clock
 from mapper_client import Mapper, MapperTest, run, wait_until
 
 STEPS = 3
-INTERVAL = 0.8  # [s]; a bag is longer than an image is late
+INTERVAL = 0.8  # [s]; a bag is then longer than the longest delay of an image
 
 
 class ClockTest(MapperTest):
@@ -28,16 +28,16 @@ class ClockTest(MapperTest):
         self.assertTrue(self.resetting.reset().success)
 
     def set_time(self, seconds):
-        """And lets it arrive."""
+        """Sets ROS time, and waits until it has arrived."""
         type(self).now = seconds
         self.clock.publish(Clock(rospy.Time.from_sec(seconds)))
         wait_until(lambda: abs(rospy.Time.now().to_sec() - seconds) < 1e-6, what='/clock')
         time.sleep(0.1)
 
     def play(self, start, clock_first=True):
-        """A little bag; both mappers have mapped it at the end."""
+        """Plays a little bag, until both mappers have mapped it."""
         for mapper in (self.mapper, self.resetting):
-            mapper.reports.clear()  # of the same stamps
+            mapper.reports.clear()  # earlier reports have the same stamps
         for step in range(STEPS):
             if clock_first or step > 0:
                 self.set_time(start + INTERVAL * step)
@@ -56,10 +56,10 @@ class ClockTest(MapperTest):
             again = self.resetting.surfels()
             if clock_first:
                 self.assert_same_but_ids(once, again)
-            else:  # tf interpolates, and so rounds otherwise, where it knows later poses already
+            else:  # tf knows later poses already: it interpolates, which rounds differently
                 self.assertLess(abs(len(again) - len(once)), 0.01 * len(once))
-        self.assertEqual(kept.sequence, first.sequence + 2 * STEPS)  # no reset among them
-        # The same images once more: hardly anything is left to be seen.
+        self.assertEqual(kept.sequence, first.sequence + 2 * STEPS)  # there was no reset
+        # The images are the same ones again, in which hardly anything is new.
         self.assertLess(abs(kept.surfels - first.surfels), 0.2 * first.surfels)
 
     def test_bag_that_loops(self):
@@ -69,7 +69,7 @@ class ClockTest(MapperTest):
         self.check_loops(clock_first=False)
 
     def test_transforms_of_the_future_are_forgotten(self):
-        """After a jump back a pose from before it is none, though its stamp may fit."""
+        """After a jump back, poses from before it are not used, although their stamps fit."""
         start = self.now
         for seconds in (0.0, 5.0, 10.0):
             self.set_time(start + seconds)
@@ -89,7 +89,7 @@ class ClockTest(MapperTest):
         self.assertGreater(report.surfels, 0)
 
     def test_impossible_stamps_reset_nothing(self):
-        """No stamp, and one of the far future: images to be dropped, but time has not jumped."""
+        """Images without a stamp or with one in the far future are dropped, and are not taken for a jump of time."""
         start = self.now
         self.play(start)
         before = self.resetting.surfels()

@@ -1,4 +1,4 @@
-/// Single messages of a bag: every encoding of images, and cameras.
+/// Single messages: every encoding of images, and cameras.
 #include <gtest/gtest.h>
 #include <sensor_msgs/CompressedImage.h>
 
@@ -28,6 +28,10 @@ ImageMessage compressed(const std::string& format, const cv::Mat& image, const s
   return {nullptr, message};
 }
 
+cv::Mat depth_image(const ImageMessage& message) { return copy(depth_pixels(message).view); }
+
+cv::Mat color_image(const ImageMessage& message) { return copy(color_pixels(message).view); }
+
 TEST(DepthMessages, RespectStepAndByteOrder) {
   sensor_msgs::Image image = depth_message(10);
   image.step = 11;
@@ -50,15 +54,37 @@ TEST(DepthMessages, RespectStepAndByteOrder) {
   image.encoding = "32FC1";
   image.step = 4 * kWidth;
   image.data.clear();
-  for (int i = 0; i < kWidth * kHeight; ++i) image.data.insert(image.data.end(), {0x3f, 0xc0, 0, 0});  // 1.5, big end first
+  for (int i = 0; i < kWidth * kHeight; ++i) image.data.insert(image.data.end(), {0x3f, 0xc0, 0, 0});  // 1.5, big-endian
   const cv::Mat depth = depth_image(raw(image));
   ASSERT_EQ(depth.type(), CV_32FC1);
   EXPECT_EQ(depth.at<float>(2, 3), 1.5f);
 }
 
+TEST(DepthMessages, AreViewedWhereTheyLie) {
+  for (const bool big_endian : {false, true}) {
+    sensor_msgs::Image image = depth_message(10);
+    image.is_bigendian = big_endian;
+    ImageMessage message = raw(image);
+    const std::uint8_t* data = message.raw->data.data();
+    const Pixels<DepthImage> pixels = depth_pixels(message);
+    EXPECT_EQ(pixels.view.data, data);
+    EXPECT_EQ(pixels.view.width, kWidth);
+    EXPECT_EQ(pixels.view.height, kHeight);
+    EXPECT_EQ(pixels.view.step, image.step);
+    EXPECT_EQ(pixels.view.encoding, DepthImage::Encoding::kMillimetresU16);
+    EXPECT_EQ(pixels.view.swap_bytes, big_endian) << "this test is for little-endian machines";
+    EXPECT_EQ(message.raw.use_count(), 2) << "the pixels keep the message alive";
+  }
+}
+
+TEST(DepthMessages, StateTheirSizeWithoutBeingDecoded) {
+  EXPECT_EQ(stated_size(raw(depth_message(10))), cv::Size(kWidth, kHeight));
+  EXPECT_FALSE(stated_size(compressed("png", cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(2020)))));
+}
+
 TEST(DepthMessages, RefuseWhatIsMalformed) {
   sensor_msgs::Image image = depth_message(10);
-  image.step = 7;  // less than a row
+  image.step = 7;  // shorter than a row
   image.data.resize(7 * kHeight);
   EXPECT_THROW(depth_image(raw(image)), BadFrame);
   image = depth_message(10);
@@ -103,9 +129,37 @@ TEST(ColourMessages, AllOrdersBecomeBgr) {
   EXPECT_THROW(color_image(raw(color_message(1, "nonsense", {1}))), BadFrame);
 }
 
+TEST(ColourMessages, OfFourOrdersAreViewedWhereTheyLie) {
+  using Order = ColorImage::Order;
+  const struct {
+    const char* encoding;
+    Order order;
+    int channels;
+  } kCases[] = {{"rgb8", Order::kRgb, 3}, {"bgr8", Order::kBgr, 3}, {"rgba8", Order::kRgb, 4}, {"bgra8", Order::kBgr, 4}};
+  for (const auto& expected : kCases) {
+    const ImageMessage message =
+        raw(color_message(1, expected.encoding, std::vector<std::uint8_t>(static_cast<std::size_t>(expected.channels), 7)));
+    const Pixels<ColorImage> pixels = color_pixels(message);
+    EXPECT_EQ(pixels.view.data, message.raw->data.data()) << expected.encoding;
+    EXPECT_EQ(pixels.view.order, expected.order);
+    EXPECT_EQ(pixels.view.channels, expected.channels);
+    EXPECT_EQ(pixels.view.step, message.raw->step);
+  }
+}
+
+TEST(ColourMessages, AreRefusedWhenTheyAreCutShort) {
+  for (const char* encoding : {"rgb8", "bgra8", "mono8"}) {
+    sensor_msgs::Image image = color_message(1, encoding, {1, 2, 3, 4});
+    image.data.pop_back();
+    EXPECT_THROW(color_pixels(raw(image)), BadFrame);
+  }
+  sensor_msgs::Image narrow = color_message(1, "rgb8", {1, 2});  // its rows are shorter than its pixels
+  EXPECT_THROW(color_pixels(raw(narrow)), BadFrame);
+}
+
 TEST(CameraMessages, RectifiedBinnedAndCropped) {
   sensor_msgs::CameraInfo info = info_message(1);
-  EXPECT_EQ(to_intrinsics(info).fy, 6) << "no P: K";
+  EXPECT_EQ(to_intrinsics(info).fy, 6) << "K is used where there is no P";
   info.width = 640;
   info.height = 480;
   info.P = {500, 0, 320, 0, 0, 490, 240, 0, 0, 0, 1, 0};

@@ -3,10 +3,11 @@
 import time
 
 import numpy
+import rospy
 from frontier_surfels.msg import FrameReport
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, PointCloud2
 
-from mapper_client import Mapper, MapperTest, case, run
+from mapper_client import Mapper, MapperTest, case, has_color, run, to_array, wait_until
 from synthetic_camera import Camera, compressed_depth, header_of, metres, pose, raw_image
 
 STEPS = 3
@@ -22,7 +23,7 @@ class Inputs(MapperTest):
         cls.colored.wait_until_connected(cls.camera.color, *cls.camera.raw())
 
     def map_of(self, make_message, mapper=None):
-        """The map of a short walk; `make_message` makes an image of millimetres."""
+        """The map of a short walk. `make_message` makes the message of an image of millimetres."""
         mapper = mapper or self.mapper
         mapper.reset()
         self.camera.new_frame()
@@ -131,7 +132,7 @@ class Inputs(MapperTest):
 
     def colored_share(self):
         surfels = self.colored.surfels()
-        return numpy.mean(surfels['rgb'][surfels['label'] == 1] & 0xFFFFFF != 0)
+        return numpy.mean(has_color(surfels)[surfels['label'] == 1])
 
     def test_color(self):
         color = self.camera.camera.color()
@@ -140,8 +141,25 @@ class Inputs(MapperTest):
             self.check_integrated(self.camera.send(step, color=color), self.colored)
         self.assertGreater(self.colored_share(), 0.8)
         surfels = self.colored.surfels()
-        self.assertTrue((surfels['rgb'][surfels['label'] == 0] & 0xFFFFFF == 0).mean() > 0.5)  # the unknown has none of its own
-        self.assertFalse(self.mapper.surfels()['rgb'].any())  # one that does not want it
+        self.assertEqual(set(surfels['rgb'][surfels['label'] == 0] & 0xFFFFFF), {0x0000FF})  # the frontier is blue
+        colorless = self.mapper.surfels()  # of a mapper without use_color
+        self.assertFalse(has_color(colorless).any())
+        self.assertEqual(set(colorless['rgb'][colorless['label'] == 1] & 0xFFFFFF), {0x808080})
+
+    def test_confidence(self):
+        """It is 1 for frontier surfels, or for occupied ones if ~cloud_confidence says so."""
+        self.colored.reset()
+        header = self.camera.send(0)
+        for mapper in (self.mapper, self.colored):
+            self.check_integrated(header, mapper)
+        surfels = self.mapper.surfels()
+        self.assertTrue((surfels['confidence'] == (surfels['label'] == 0)).all())
+        clouds = [self.colored.surfels()]
+        subscriber = rospy.Subscriber('colored/surfels', PointCloud2, lambda cloud: clouds.append(to_array(cloud)))
+        self.addCleanup(subscriber.unregister)
+        wait_until(lambda: len(clouds) > 1 and len(clouds[-1]) == len(clouds[0]), what='the cloud of the whole map')
+        for surfels in clouds:
+            self.assertTrue((surfels['confidence'] == (surfels['label'] == 1)).all())
 
     def test_color_a_little_later_than_depth(self):
         color = self.camera.camera.color()

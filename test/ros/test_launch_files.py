@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The launch files: roslaunch's own check, their documentation, and the two that play a bag from end to end."""
+"""The launch files: roslaunch checks them, all arguments are documented, and those that play a bag are run."""
 import glob
 import json
 import os
@@ -42,7 +42,7 @@ class LaunchFiles(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def check(self, path, *arguments):
-        """roslaunch's check takes arguments from the command line."""
+        """roslaunch's check reads the arguments from sys.argv."""
         saved, sys.argv = sys.argv, ['roslaunch-check', *arguments]
         try:
             self.assertIsNone(roslaunch.rlutil.check_roslaunch(path))

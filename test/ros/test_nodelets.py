@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Mappers as nodelets of one manager, which is never taken down by them."""
+"""Several mappers as nodelets of one manager, which goes on whatever happens to them."""
 import threading
 import time
 
@@ -30,7 +30,7 @@ class Nodelets(MapperTest):
             self.assertTrue(mapper.reset().success)
 
     def load_mapper(self, name):
-        """@return whether it was loaded"""
+        """Returns whether it was loaded."""
         try:
             return self.load('/' + name, 'frontier_surfels/mapper', SOURCES, TARGETS, [], '').success
         except rospy.ServiceException:

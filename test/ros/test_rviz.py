@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""rviz with the shipped configuration shows the map: seen on a screenshot."""
+"""Screenshots of rviz with the shipped configuration show the map."""
 import io
 import os
 import subprocess
@@ -12,7 +12,7 @@ from PIL import Image as Picture
 from mapper_client import CameraTopics, Mapper, run, wait_until
 from synthetic_camera import BACK
 
-RENDERED = (slice(80, 880), slice(380, 1380))  # rows and columns of the window of rviz/mapper.rviz that show the map
+RENDERED = (slice(80, 880), slice(380, 1380))  # rows and columns of the window that show the map, with rviz/mapper.rviz
 
 
 class Rviz(unittest.TestCase):
@@ -23,7 +23,7 @@ class Rviz(unittest.TestCase):
         return process
 
     def start_display(self):
-        """Xvfb chooses a free number."""
+        """Starts an X server, which chooses a free number. Returns the environment for programs on it."""
         read_end, write_end = os.pipe()
         self.start('Xvfb', '-displayfd', str(write_end), '-screen', '0', '1400x900x24', '-nolisten', 'tcp', pass_fds=[write_end],
                    stderr=subprocess.DEVNULL)
@@ -37,7 +37,7 @@ class Rviz(unittest.TestCase):
         return numpy.asarray(Picture.open(io.BytesIO(result.stdout)).convert('RGB'))[RENDERED].astype(int)
 
     def count(self):
-        """Pixels of the frontier's blue, and of the orange that the camera has seen."""
+        """Counts the pixels in the frontier's blue, and those in the orange of the colour images."""
         red, green, blue = numpy.moveaxis(self.screenshot(), -1, 0)
         self.counted = int(((blue > 80) & (blue > 1.5 * red)).sum()), int(((red > 150) & (red > 1.5 * green) & (green > 1.5 * blue)).sum())
         return self.counted

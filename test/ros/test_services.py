@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Reset, pause, boxes, saving and loading; what goes wrong with a file costs neither the map nor an older file."""
+"""Reset, pause, boxes, saving and loading. When a file cannot be read or written, the map and older files stay as they were."""
 import os
 import resource
 import shutil
@@ -72,7 +72,7 @@ class Services(MapperTest):
         sequence, loaded = self.mapper.map()
         self.assert_same_but_ids(saved, loaded)
         self.assertEqual(sequence, report.sequence + 2)
-        self.map_walk(1, first=3)  # and it goes on
+        self.map_walk(1, first=3)  # mapping continues
 
     def test_save_replaces_an_older_file(self):
         self.map_walk(1)
@@ -117,9 +117,10 @@ class Services(MapperTest):
         self.assert_same_map(before[1], after[1])
 
     def start_full(self):
-        """A mapper whose files cannot grow beyond a limit that is set later, as on a disk without space."""
-        process = subprocess.Popen([find_node('frontier_surfels', 'mapper_node')[0], '__name:=full', 'depth/image:=camera/depth/image_rect',
-                                    'depth/camera_info:=camera/depth/camera_info'], restore_signals=False)  # Python ignores SIGXFSZ
+        """Starts a mapper whose files can be limited in size later, which is like a full disk."""
+        command = [find_node('frontier_surfels', 'mapper_node')[0], '__name:=full', 'depth/image:=camera/depth/image_rect',
+                   'depth/camera_info:=camera/depth/camera_info']
+        process = subprocess.Popen(command, restore_signals=False)  # else the process would inherit that Python ignores SIGXFSZ
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
         mapper = Mapper('full')

@@ -1,4 +1,4 @@
-/// What somebody who applies the markers sees, against the surfels themselves.
+/// What a subscriber of ~markers sees, compared with the surfels.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ bool before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
 }
 
-/// One square for each surfel, in its place, and no other.
+/// Every surfel is shown by exactly one square at its place, and there are no other squares.
 void expect_every_surfel(const Scene& scene, const SurfelMirror& map) {
   std::vector<Square> squares = scene.squares();
   std::vector<Surfel> surfels = map.surfels();
@@ -48,7 +48,7 @@ void expect_every_surfel(const Scene& scene, const SurfelMirror& map) {
   }
 }
 
-/// A map, its markers, and what is seen of them.
+/// A map, its markers, and what a subscriber sees of them.
 struct World {
   explicit World(std::size_t limit) : markers("map", limit) {}
 
@@ -60,7 +60,7 @@ struct World {
   }
   MarkerArray update(bool all = false, const std::optional<CameraView>& camera = std::nullopt) {
     MarkerArray message = markers.update(map, camera, ros::Time(12.5), all);
-    scene.apply(message, std::max(0.5, markers.cell()));  // blocks grow where cubes of 0.5 m are too many
+    scene.apply(message, std::max(0.5, markers.cell()));  // blocks are larger if there would be too many cubes of 0.5 m
     return message;
   }
 
@@ -99,7 +99,7 @@ TEST(SurfelMarkers, SendOnlyBlocksThatWereTouched) {
   moved.position = 0.99F * world.map.slots()[78].position;
   world.apply({moved}, {});
   const MarkerArray message = world.update();
-  EXPECT_LE(message.markers.size(), 4U + 1U);  // the two blocks it went from and to, and the counts
+  EXPECT_LE(message.markers.size(), 4U + 1U);  // two blocks with two labels each, and the numbers of surfels
   EXPECT_GE(message.markers.size(), 2U + 1U);
   expect_every_surfel(world.scene, world.map);
 
@@ -168,7 +168,7 @@ TEST(SurfelMarkers, ComeAllAgainWhenAskedFor) {
   expect_every_surfel(later, world.map);
 }
 
-/// Three walls and a floor of surfels 1 cm apart, each of one label and colour.
+/// Three walls and a floor of surfels 1 cm apart. Each of them has one label and one colour.
 std::vector<Surfel> walls() {
   std::vector<Surfel> surfels;
   for (int wall = 0; wall < 4; ++wall) {
@@ -198,17 +198,17 @@ TEST(MergedSquares, CoverTheSurfels) {
     const auto squares = world.scene.squares();
     EXPECT_GT(world.markers.cell(), 0);
     EXPECT_LE(squares.size(), limit);
-    EXPECT_GT(8 * squares.size(), limit) << "finer ones would do";
+    EXPECT_GT(8 * squares.size(), limit) << "smaller cubes would keep the limit as well";
     for (const Surfel& surfel : world.map.surfels()) {
       double nearest = 1;
       for (const Square& square : squares)
         if (square.label == surfel.label && nearest > 0) nearest = std::min(nearest, distance(surfel, square));
-      ASSERT_LE(nearest, 0.0051) << "limit " << limit << ", surfel at " << surfel.position.transpose();  // half of what is between two
+      ASSERT_LE(nearest, 0.0051) << "limit " << limit << ", surfel at " << surfel.position.transpose();  // half the distance of two surfels
     }
   }
 }
 
-/// A lattice of surfels half an edge apart: one less than all of them need cubes of that edge.
+/// With a lattice of surfels that are half an edge apart, a limit one below their number needs cubes of that edge.
 TEST(MergedSquares, AreOneACube) {
   for (const float edge : {1 / 128.0F, 1 / 64.0F, 1 / 16.0F, 0.5F, 1.0F, 8.0F}) {
     std::vector<Surfel> surfels(1000);

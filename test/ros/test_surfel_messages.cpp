@@ -1,4 +1,4 @@
-/// Surfels as clouds and back: bit for bit, and nothing from what is damaged.
+/// Surfels are packed into clouds and read again bit for bit, and damaged clouds are refused.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -33,6 +33,9 @@ SurfelMirror mirror_of(const std::vector<Surfel>& surfels) {
   return mirror;
 }
 
+/// Indices of fields in a cloud.
+constexpr std::size_t kId = 3, kLabel = 7, kRgb = 8, kRadius = 9, kConfidence = 10, kCurvature = 11;
+
 template <typename T>
 T read(const PointCloud2& cloud, std::size_t point, std::size_t field) {
   T value;
@@ -42,38 +45,69 @@ T read(const PointCloud2& cloud, std::size_t point, std::size_t field) {
 
 TEST(SurfelClouds, ComeBackBitForBit) {
   const auto surfels = awkward_surfels();
-  EXPECT_TRUE(same(to_surfels(to_cloud(surfels)), surfels));
+  for (const Label confident : {Label::kFrontier, Label::kOccupied}) EXPECT_TRUE(same(to_surfels(to_cloud(surfels, confident)), surfels));
   EXPECT_TRUE(to_surfels(to_cloud(std::vector<Surfel>())).empty());
 }
 
 TEST(SurfelClouds, HaveTheFieldsThatOthersExpect) {
   Surfel surfel;
   surfel.position = {1, 2, 3};
-  surfel.normal = {4, 5, 6};
-  surfel.radius = 7;
-  surfel.rgb = {0x12, 0x34, 0x56};
-  surfel.id = 8;
+  surfel.id = 4;
+  surfel.normal = {5, 6, 7};
   surfel.label = Label::kOccupied;
+  surfel.rgb = {0x12, 0x34, 0x56};
+  surfel.radius = 8;
   const PointCloud2 cloud = to_cloud({Surfel(), surfel});
   EXPECT_EQ(cloud.height, 1U);
   EXPECT_EQ(cloud.width, 2U);
-  EXPECT_EQ(cloud.point_step, 40U);
-  EXPECT_EQ(cloud.row_step, 80U);
-  EXPECT_EQ(cloud.data.size(), 80U);
+  EXPECT_EQ(cloud.point_step, 48U);
+  EXPECT_EQ(cloud.row_step, 96U);
+  EXPECT_EQ(cloud.data.size(), 96U);
 
-  const std::vector<std::string> names = {"x", "y", "z", "normal_x", "normal_y", "normal_z", "radius", "rgb", "id", "label"};
+  const std::vector<std::string> names = {"x",        "y",     "z",   "id",     "normal_x",   "normal_y",
+                                          "normal_z", "label", "rgb", "radius", "confidence", "curvature"};
   ASSERT_EQ(cloud.fields.size(), names.size());
   for (std::size_t n = 0; n < names.size(); ++n) {
     EXPECT_EQ(cloud.fields[n].name, names[n]);
+    EXPECT_EQ(cloud.fields[n].offset, 4 * n);
     EXPECT_EQ(cloud.fields[n].count, 1U);
-    EXPECT_EQ(cloud.fields[n].datatype, n < 8 ? PointField::FLOAT32 : n == 8 ? PointField::UINT32 : PointField::UINT8);
+    EXPECT_EQ(cloud.fields[n].datatype, n == kId || n == kLabel ? PointField::UINT32 : PointField::FLOAT32);
   }
-  for (std::size_t n = 0; n < 7; ++n) EXPECT_EQ(read<float>(cloud, 1, n), static_cast<float>(n + 1));
-  EXPECT_EQ(read<std::uint32_t>(cloud, 1, 7), 0x123456U);
-  EXPECT_EQ(read<std::uint32_t>(cloud, 0, 7), 0U);
-  EXPECT_EQ(read<std::uint32_t>(cloud, 1, 8), 8U);
-  EXPECT_EQ(read<std::uint8_t>(cloud, 1, 9), 1);
-  EXPECT_EQ(read<std::uint8_t>(cloud, 0, 9), 0);
+  for (const std::size_t n : {0, 1, 2, 4, 5, 6}) EXPECT_EQ(read<float>(cloud, 1, n), static_cast<float>(n + 1));
+  EXPECT_EQ(read<std::uint32_t>(cloud, 1, kId), 4U);
+  EXPECT_EQ(read<std::uint32_t>(cloud, 1, kLabel), 1U);
+  EXPECT_EQ(read<std::uint32_t>(cloud, 0, kLabel), 0U);
+  EXPECT_EQ(read<std::uint32_t>(cloud, 1, kRgb), 0x123456U);
+  EXPECT_EQ(read<float>(cloud, 1, kRadius), 8);
+  EXPECT_EQ(read<float>(cloud, 1, kCurvature), 0);
+}
+
+TEST(SurfelClouds, ShowSurfelsWithoutAColour) {
+  Surfel frontier, occupied, grey, blue;
+  occupied.label = grey.label = Label::kOccupied;
+  grey.rgb = {128, 128, 128};
+  blue.rgb = {0, 0, 255};
+  const std::vector<Surfel> surfels = {frontier, occupied, grey, blue};
+  const PointCloud2 cloud = to_cloud(surfels);
+  const auto rgb = [&](std::size_t point) { return read<std::uint32_t>(cloud, point, kRgb) & 0xffffff; };
+  EXPECT_EQ(rgb(0), 0x0000ffU);
+  EXPECT_EQ(rgb(1), 0x808080U);
+  EXPECT_EQ(rgb(2), 0x808080U);
+  EXPECT_EQ(rgb(3), 0x0000ffU);
+  EXPECT_TRUE(same(to_surfels(cloud), surfels)) << "the colours in the cloud are only for show";
+}
+
+TEST(SurfelClouds, AreConfidentOfOneLabel) {
+  Surfel frontier, occupied;
+  occupied.label = Label::kOccupied;
+  for (const Label confident : {Label::kFrontier, Label::kOccupied}) {
+    const PointCloud2 cloud = to_cloud({frontier, occupied}, confident);
+    EXPECT_EQ(read<float>(cloud, 0, kConfidence), confident == Label::kFrontier ? 1 : 0);
+    EXPECT_EQ(read<float>(cloud, 1, kConfidence), confident == Label::kOccupied ? 1 : 0);
+    const SurfelUpdate update = to_message(Changes{1, {frontier}, {}}, 0, Eigen::AlignedBox3f(), confident);
+    EXPECT_EQ(read<float>(update.surfels, 0, kConfidence), confident == Label::kFrontier ? 1 : 0);
+  }
+  EXPECT_EQ(to_cloud({frontier, occupied}).data, to_cloud({frontier, occupied}, Label::kFrontier).data);
 }
 
 TEST(SurfelClouds, OfAMapLeaveOutItsGaps) {
@@ -83,10 +117,10 @@ TEST(SurfelClouds, OfAMapLeaveOutItsGaps) {
   ASSERT_LT(mirror.size(), mirror.slots().size());
   EXPECT_TRUE(same(to_surfels(to_cloud(mirror)), mirror.surfels()));
   for (const Label label : {Label::kOccupied, Label::kFrontier})
-    EXPECT_TRUE(same(to_surfels(to_cloud(mirror, label)), mirror.surfels(label)));
+    EXPECT_TRUE(same(to_surfels(to_cloud(mirror, Label::kFrontier, label)), mirror.surfels(label)));
 }
 
-/// The fields in another order, with gaps, and in rows with gaps.
+/// Fields in another order and with gaps, and rows with gaps.
 TEST(SurfelClouds, AreReadByTheirFieldsNames) {
   const auto surfels = awkward_surfels();
   const PointCloud2 plain = to_cloud(surfels);
@@ -96,20 +130,19 @@ TEST(SurfelClouds, AreReadByTheirFieldsNames) {
   cloud.fields.insert(cloud.fields.begin() + 4, PointField());
   cloud.width = 300;
   cloud.height = 10;
-  cloud.point_step = 57;
-  cloud.row_step = 300 * 57 + 11;
+  cloud.point_step = 67;
+  cloud.row_step = 300 * 67 + 11;
   cloud.data.assign(10 * cloud.row_step - 11, 0xee);
   for (std::size_t point = 0; point < surfels.size(); ++point) {
     for (const PointField& field : plain.fields) {
       const auto to = std::find_if(cloud.fields.begin(), cloud.fields.end(), [&](const PointField& f) { return f.name == field.name; });
-      std::memcpy(&cloud.data[point / 300 * cloud.row_step + point % 300 * 57 + to->offset], &plain.data[point * 40 + field.offset],
-                  field.datatype == PointField::UINT8 ? 1 : 4);
+      std::memcpy(&cloud.data[point / 300 * cloud.row_step + point % 300 * 67 + to->offset], &plain.data[point * 48 + field.offset], 4);
     }
   }
   EXPECT_TRUE(same(to_surfels(cloud), surfels));
 }
 
-/// @return the sentence of the error, empty if there was none
+/// @return the sentence of the error that a damaged cloud causes; empty if it is read
 std::string refusal(const std::function<void(PointCloud2&)>& damage) {
   Rng rng(3);
   PointCloud2 cloud = to_cloud(random_surfels(rng, 10));
@@ -123,7 +156,7 @@ std::string refusal(const std::function<void(PointCloud2&)>& damage) {
 }
 
 TEST(SurfelClouds, AreRefusedWithoutOneOfTheFields) {
-  for (std::size_t n = 0; n < 10; ++n) {
+  for (std::size_t n = 0; n < kConfidence; ++n) {
     std::string name;
     const std::string missing = refusal([&](PointCloud2& cloud) {
       name = cloud.fields[n].name;
@@ -133,17 +166,21 @@ TEST(SurfelClouds, AreRefusedWithoutOneOfTheFields) {
     const std::string retyped = refusal([&](PointCloud2& cloud) { cloud.fields[n].datatype = PointField::INT16; });
     EXPECT_NE(retyped.find("field " + name + " is not of the type"), std::string::npos) << retyped;
     EXPECT_NE(refusal([&](PointCloud2& cloud) { cloud.fields[n].count = 2; }), "");
-    const std::string outside = refusal([&](PointCloud2& cloud) { cloud.fields[n].offset = 40; });
+    const std::string outside = refusal([&](PointCloud2& cloud) { cloud.fields[n].offset = 48; });
     EXPECT_NE(outside.find("outside"), std::string::npos) << outside;
     EXPECT_NE(refusal([&](PointCloud2& cloud) { cloud.fields[n].offset = 0xfffffffe; }), "");
   }
+}
+
+TEST(SurfelClouds, NeedNoFieldsThatNoSurfelHas) {
+  EXPECT_EQ(refusal([](PointCloud2& cloud) { cloud.fields.resize(kConfidence); }), "");
 }
 
 TEST(SurfelClouds, AreRefusedWhenTheDataAreDamaged) {
   EXPECT_EQ(refusal([](PointCloud2&) {}), "");
   const std::string cut = refusal([](PointCloud2& cloud) { cloud.data.pop_back(); });
   EXPECT_NE(cut.find("cut short"), std::string::npos) << cut;
-  EXPECT_NE(cut.find("399 bytes instead of 400"), std::string::npos) << cut;
+  EXPECT_NE(cut.find("479 bytes instead of 480"), std::string::npos) << cut;
   EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.data.clear(); }), "");
   EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.width = 0xffffffff; }), "");
   EXPECT_NE(refusal([](PointCloud2& cloud) { cloud.height = 0xffffffff; }), "");
@@ -155,7 +192,7 @@ TEST(SurfelClouds, AreRefusedWhenTheDataAreDamaged) {
             "");
   const std::string order = refusal([](PointCloud2& cloud) { cloud.is_bigendian = !cloud.is_bigendian; });
   EXPECT_NE(order.find("byte order"), std::string::npos) << order;
-  const std::string label = refusal([](PointCloud2& cloud) { cloud.data[7 * 40 + cloud.fields[9].offset] = 2; });
+  const std::string label = refusal([](PointCloud2& cloud) { cloud.data[7 * 48 + cloud.fields[kLabel].offset] = 2; });
   EXPECT_NE(label.find("2 is no label"), std::string::npos) << label;
 }
 
@@ -187,7 +224,7 @@ TEST(SerializedMessages, AreNotSerialisedAgain) {
   PointCloud2 back;
   ros::serialization::deserializeMessage(bytes, back);
   EXPECT_EQ(back.data, cloud.data);
-  EXPECT_STREQ(ros::message_traits::md5sum(packed), "*") << "it must fit every topic";
+  EXPECT_STREQ(ros::message_traits::md5sum(packed), "*") << "a serialised message must fit every topic";
 }
 
 TEST(FrameReports, SayWhatTheMapperSays) {

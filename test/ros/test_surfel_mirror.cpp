@@ -1,4 +1,4 @@
-/// The copy of the map against a plain std::map, and changes that have to wait.
+/// The copy of the map compared with a plain std::map, and changes that have to wait.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -34,7 +34,7 @@ void expect_equal(const SurfelMirror& mirror, const Follower& truth) {
   EXPECT_EQ(mirror.surfels(Eigen::AlignedBox3f()).size(), 0U);
 }
 
-/// The box, the slow way: around all that is in one of the two maps but not, or not alike, in the other, and all that was sent again.
+/// The box, computed slowly: around all surfels that are updated, and all that were there before and are updated or removed.
 Eigen::AlignedBox3f box_around(const std::vector<Surfel>& before, const Changes& changes) {
   Eigen::AlignedBox3f box;
   for (const Surfel& surfel : changes.updated) box.extend(surfel.position);
@@ -53,10 +53,10 @@ TEST(SurfelMirror, FollowsRandomChanges) {
   std::map<std::uint32_t, Surfel> visited;
   const auto visit = [&](const Surfel& surfel, bool comes) {
     if (comes) {
-      EXPECT_TRUE(visited.emplace(surfel.id, surfel).second) << "came twice";
+      EXPECT_TRUE(visited.emplace(surfel.id, surfel).second) << "it came twice";
     } else {
       ASSERT_EQ(visited.count(surfel.id), 1U);
-      EXPECT_TRUE(same(visited[surfel.id], surfel)) << "went as another one";
+      EXPECT_TRUE(same(visited[surfel.id], surfel)) << "the surfel that went is not the one that came";
       visited.erase(surfel.id);
     }
   };
@@ -79,7 +79,7 @@ TEST(SurfelMirror, IsReplacedByAWholeMap) {
   mirror.apply({7, old, {}}, 0);
   std::size_t went = 0, came = 0;
   Changes whole = random_changes(rng, 10, kIds, 400);
-  whole.removed = {0, 1, 2, 0xffffffff};  // of which nobody knows any more
+  whole.removed = {0, 1, 2, 0xffffffff};  // ids without a surfel
   whole.updated.erase(whole.updated.begin(), whole.updated.begin() + 3);
   Follower truth;
   truth.apply(whole);
@@ -113,7 +113,7 @@ TEST(MergedChanges, EqualTheTwoOneByOne) {
     Changes earlier = random_changes(rng, 1, kIds, 800), later = random_changes(rng, earlier.sequence, kIds, 800);
     singly.apply(earlier);
     singly.apply(later);
-    if (n % 2 == 1) {  // their order is nobody's promise
+    if (n % 2 == 1) {  // changes may be in any order
       std::shuffle(earlier.updated.begin(), earlier.updated.end(), rng);
       std::shuffle(later.removed.begin(), later.removed.end(), rng);
     }
@@ -138,7 +138,7 @@ TEST(MergedChanges, TellOfASurfelThatWentAndCameBack) {
   EXPECT_EQ(merge({2, {a}, {}}, {3, {}, {1}}).removed, std::vector<std::uint32_t>{1});
 }
 
-/// Pushes changes into a queue that is emptied seldom; what comes out gives the map, in steps that follow each other.
+/// Changes go through a queue that is emptied seldom. What comes out is in order, and gives the map.
 TEST(PushedChanges, GiveTheMapHoweverLongTheyWait) {
   constexpr std::size_t kMost = 4;
   Rng rng(6);

@@ -1,4 +1,5 @@
-// UpdateReceiver against map histories: whatever the topic loses, repeats, reorders or merges, each of its states is one the map has had.
+/// UpdateReceiver with random histories of a map: whatever updates are lost, repeated, reordered or merged, the copy always equals a map
+/// that the mapper had.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +27,7 @@ bool same(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Surfel& x, const Surfel& y) { return same(x, y); });
 }
 
-/// A map whose surfels come, change and go; ids are used again.
+/// A map whose surfels come, change and go. Ids are used again.
 class Truth {
  public:
   explicit Truth(unsigned seed) : random_(seed) { history_.emplace_back(); }
@@ -36,7 +37,7 @@ class Truth {
     for (int i = draw(random_, 20); i > 0; --i) {
       const auto id = static_cast<std::uint32_t>(draw(random_, 60));
       Slot& slot = slots_[id];
-      // An id is free for others only after its removal could be told.
+      // An id may be used again only after its removal could be sent.
       if (!slot.surfel && slot.changed == sequence_) continue;
       slot.changed = sequence_;
       slot.surfel.reset();
@@ -98,7 +99,7 @@ class Truth {
   std::vector<std::vector<Surfel>> history_;
 };
 
-/// A receiver of a Truth's updates whose service can be out of order.
+/// A receiver of a Truth's updates. Its service can give old answers or fail.
 class UpdateReceiverTest : public testing::Test {
  protected:
   void step(int count = 1) {
@@ -112,7 +113,7 @@ class UpdateReceiverTest : public testing::Test {
   Truth truth_{7};
   int asked_ = 0;
   bool out_of_order_ = false;
-  std::optional<Changes> answer_;  ///< of the service, if not the map as it is now
+  std::optional<Changes> answer_;  ///< what the service answers, if it is not the present map
   UpdateReceiver receiver_{[this] {
     ++asked_;
     if (out_of_order_) throw Error("The service does not answer.");
@@ -138,7 +139,7 @@ TEST_F(UpdateReceiverTest, WhoJoinsLateAsksOnce) {
   receive(10);
   EXPECT_TRUE(has(11));
   EXPECT_EQ(asked_, 1);
-  EXPECT_EQ(receiver_.gaps(), 0u) << "nothing that was to be had has been lost";
+  EXPECT_EQ(receiver_.gaps(), 0u) << "no update was missing";
 }
 
 TEST_F(UpdateReceiverTest, HealsAGap) {
@@ -159,7 +160,7 @@ TEST_F(UpdateReceiverTest, GoesOnAfterAGapWithUpdatesThatTheWholeMapContained) {
   step();
   const SurfelUpdate fourth = truth_.update(3);
   step();
-  receiver_.receive(third);  // the service answers with the fifth
+  receiver_.receive(third);  // the service answers with map 5
   EXPECT_TRUE(has(5));
   receiver_.receive(fourth);
   EXPECT_TRUE(has(5));
@@ -175,13 +176,13 @@ TEST_F(UpdateReceiverTest, TakesTheUpdateAsWellWhereTheServiceAnswersWithTheMapB
   step(2);
   answer_ = truth_.changes(0);
   step();
-  receive(2);  // of 3 and 4; the service's map is the third
+  receive(2);  // with the changes to maps 3 and 4; the service answers with map 3
   EXPECT_TRUE(has(4));
 
   step();
   const SurfelUpdate missed = truth_.update(4);
   step();
-  receive(5);  // of 6; the service's map is still the third
+  receive(5);  // with the changes to map 6; the service still answers with map 3
   EXPECT_TRUE(has(3)) << "an update was applied to a map that it does not continue";
   answer_.reset();
   receive(5);
@@ -199,7 +200,7 @@ TEST_F(UpdateReceiverTest, IgnoresWhatItKnowsAndTakesWhatOverlaps) {
   receiver_.receive(second);
   EXPECT_TRUE(has(2));
   step(3);
-  receive(1);  // of 2 to 5, while 2 is known
+  receive(1);  // with the changes to maps 2 to 5, of which map 2 is known
   EXPECT_TRUE(has(5));
   receiver_.receive(second);
   EXPECT_TRUE(has(5));
@@ -222,7 +223,7 @@ TEST_F(UpdateReceiverTest, AsksAgainAfterAServiceThatFailed) {
   out_of_order_ = true;
   step(2);
   EXPECT_THROW(receive(2), Error);
-  EXPECT_TRUE(has(1)) << "the map changed although nothing could be had";
+  EXPECT_TRUE(has(1)) << "the copy changed although the service failed";
   step();
   EXPECT_THROW(receive(3), Error);
   out_of_order_ = false;
@@ -230,7 +231,7 @@ TEST_F(UpdateReceiverTest, AsksAgainAfterAServiceThatFailed) {
   receive(4);
   EXPECT_TRUE(has(5));
   EXPECT_EQ(asked_, 3);
-  EXPECT_EQ(receiver_.gaps(), 1u) << "it is one gap, however often it was asked about";
+  EXPECT_EQ(receiver_.gaps(), 1u) << "it is one gap, however often the service was asked";
 }
 
 TEST_F(UpdateReceiverTest, RefusesWhatItCannotRead) {
@@ -246,7 +247,7 @@ TEST_F(UpdateReceiverTest, RefusesWhatItCannotRead) {
   EXPECT_TRUE(has(10));
 }
 
-/// What a topic and its publisher may do to an update.
+/// What may happen to an update on its way.
 enum class Fate { kArrives, kIsLost, kArrivesTwice, kComesLate, kIsMergedWithNext, kIsWhole };
 
 TEST_F(UpdateReceiverTest, EveryStateIsOneThatTheMapHasHad) {
@@ -254,7 +255,7 @@ TEST_F(UpdateReceiverTest, EveryStateIsOneThatTheMapHasHad) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     Random random(seed);
     Truth truth(1000 + seed);
-    int chance_of_failure = draw(random, 2);  // of the service: 0: none
+    int chance_of_failure = draw(random, 2);  // of the service; 0: never
     UpdateReceiver receiver([&] {
       if (chance_of_failure > 0 && draw(random, 3) < chance_of_failure) throw Error("The service does not answer.");
       return truth.changes(0);
@@ -289,10 +290,10 @@ TEST_F(UpdateReceiverTest, EveryStateIsOneThatTheMapHasHad) {
     chance_of_failure = 0;
     truth.step();
     receive(truth.update(published));
-    ASSERT_EQ(receiver.map().sequence(), truth.sequence()) << "seed " << seed << ": behind in the end";
+    ASSERT_EQ(receiver.map().sequence(), truth.sequence()) << "seed " << seed << ": the copy is behind at the end";
     gaps += static_cast<int>(receiver.gaps());
   }
-  EXPECT_GT(gaps, 200) << "the histories are too tame";
+  EXPECT_GT(gaps, 200) << "the histories have too few gaps to be a test";
   EXPECT_GT(failures, 50);
 }
 

@@ -12,7 +12,7 @@ import zlib
 import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from frontier_surfels.msg import SurfelUpdate
+from frontier_surfels.msg import FrameReport, SurfelUpdate
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -20,7 +20,7 @@ from mapper_client import Mapper, MapperTest, run, to_array, wait_until
 
 
 class Follower:
-    """Follows a map by the rules of SurfelUpdate.msg, with a copy of its own."""
+    """A copy of a map that follows the rules of SurfelUpdate.msg."""
 
     def __init__(self, mapper, lose=()):
         self.mapper, self.lose = mapper, set(lose)
@@ -61,7 +61,7 @@ class Follower:
 
     @staticmethod
     def check_box(update, changed):
-        """What was removed, if only from the map before a whole one, may widen it."""
+        """The box contains all changed surfels. Removed surfels may make it larger, also those of the map before a whole one."""
         for axis in 'xyz':
             low, high = getattr(update.box_min, axis), getattr(update.box_max, axis)
             if len(changed):
@@ -89,7 +89,7 @@ class Updates(MapperTest):
         self.assertEqual(follower.bytes(), surfels.tobytes())
 
     def check_cloud(self, topic, expected):
-        """A late joiner gets it without a frame; what was latched earlier may come before it."""
+        """A new subscriber gets the cloud without a new frame. An older latched cloud may come first."""
         clouds = []
         subscriber = rospy.Subscriber(f'mapper/{topic}', PointCloud2, clouds.append)
         self.addCleanup(subscriber.unregister)
@@ -105,11 +105,11 @@ class Updates(MapperTest):
         self.assertLessEqual(follower.whole, 1)
 
     def test_updates_from_a_late_join(self):
-        """The whole map comes without a frame; who followed before is not disturbed."""
+        """A new subscriber gets the whole map without a new frame, and older subscribers are not disturbed."""
         early = self.follow()
         self.map_walk(3)
         late = subprocess.Popen([sys.executable, __file__, '--follow'], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.addCleanup(late.communicate)  # ends its input, and so itself
+        self.addCleanup(late.communicate)  # ends its input, and thereby the process
         for first in (3, 5):
             sequence, surfels = self.mapper.map()
             print(sequence, file=late.stdin, flush=True)
@@ -184,7 +184,7 @@ class Updates(MapperTest):
         return statistics.median(latencies)
 
     def start_stopped_subscriber(self, topic):
-        """It has connected, and then it reads nothing any more."""
+        """Starts a subscriber that stops reading as soon as it has got a message."""
         process = subprocess.Popen(['rostopic', 'echo', '--noarr', f'mapper/{topic}'], stdout=subprocess.PIPE)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
@@ -199,7 +199,7 @@ class Updates(MapperTest):
             self.start_stopped_subscriber(topic)
         together = self.median_latency(60)
         self.assertLess(together, 1.5 * alone + 10)
-        self.check_followed(self.follow())  # others are served all the same
+        self.check_followed(self.follow())  # other subscribers still get everything
 
     def test_diagnostics(self):
         received = []
@@ -209,8 +209,10 @@ class Updates(MapperTest):
 
         subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, receive)
         self.addCleanup(subscriber.unregister)
-        self.camera.send(0, send_pose=False)
+        header = self.camera.send(0, send_pose=False)
         report = self.map_walk(2)
+        self.check_dropped(header, FrameReport.DROPPED_NO_POSE, '.')
+        received.clear()  # diagnostics from before the image was dropped
 
         def mapping():
             values = [{entry.key: entry.value for entry in status.values} for status in received if status.level == 0]
@@ -223,7 +225,8 @@ class Updates(MapperTest):
 
 
 def follow_elsewhere():
-    """Another node, as subscribers of one node share a connection. For every number on its input it says which map it has by then."""
+    """The main program of a follower in another node, because subscribers in one node share a connection. For every sequence number on its
+    input it waits for that map, and prints what it has."""
     rospy.init_node('late', anonymous=True)
     follower = Follower(Mapper())
     for line in sys.stdin:

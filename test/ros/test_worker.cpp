@@ -1,4 +1,4 @@
-/// The thread between the callbacks and the mapper.
+/// The mapping thread.
 
 #include <gtest/gtest.h>
 
@@ -13,54 +13,79 @@
 namespace frontier_surfels {
 namespace {
 
-/// Holds a worker's frame back until it is let go.
+/// Holds the worker back until it is opened.
 struct Gate {
   std::promise<void> opened;
   std::shared_future<void> open{opened.get_future()};
 };
 
-TEST(Worker, OnlyTheNewestFrameWaits) {
+TEST(Worker, MapsAllThatIsReadyWhenItIsWoken) {
+  std::atomic<int> ready{3}, mapped{0}, after{0};
+  std::promise<void> done;
+  Worker worker(
+      [&] {
+        if (ready == 0) return false;
+        --ready;
+        ++mapped;
+        return true;
+      },
+      [&] {
+        ++after;
+        if (ready == 0 && mapped == 3) {
+          mapped = 0;
+          done.set_value();
+        }
+      });
+  worker.start();
+  worker.wake();
+  done.get_future().wait();
+  EXPECT_GE(after, 3) << "`after` is called after every frame";
+}
+
+TEST(Worker, RunsJobsBetweenFrames) {
   Gate gate;
   std::promise<void> first_began;
-  std::vector<int> mapped;
-  Worker<int> worker(
-      [&](int frame) {
-        if (frame == 1) {
+  std::vector<int> order;
+  int frame = 0;
+  Worker worker(
+      [&] {
+        if (frame == 2) return false;
+        if (++frame == 1) {
           first_began.set_value();
           gate.open.wait();
         }
-        mapped.push_back(frame);
+        order.push_back(frame);
+        return true;
       },
       [] {});
+  worker.wake();  // is not lost although the worker has not started
   worker.start();
-  EXPECT_FALSE(worker.put(1));
   first_began.get_future().wait();
-  EXPECT_FALSE(worker.put(2));
-  EXPECT_EQ(worker.put(3), 2);
-  EXPECT_EQ(worker.put(4), 3);
+  auto job = std::async(std::launch::async, [&] { worker.run_job([&] { order.push_back(-1); }); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // the job waits for the frame
   gate.opened.set_value();
-  worker.run_job([] {});  // after frame 1; frame 4 may come before or after
-  while (worker.run_job([&] { return mapped.size(); }) < 2) std::this_thread::yield();
+  job.get();
+  while (worker.run_job([&] { return order.size(); }) < 3) std::this_thread::yield();
   worker.stop();
-  EXPECT_EQ(mapped, (std::vector<int>{1, 4}));
+  EXPECT_EQ(order, (std::vector<int>{1, -1, 2}));
 }
 
 TEST(Worker, JobsAnswerAndThrow) {
-  Worker<int> worker([](int) {}, [] {});
+  Worker worker([] { return false; }, [] {});
   worker.start();
   EXPECT_EQ(worker.run_job([] { return 7; }), 7);
   EXPECT_THROW(worker.run_job([]() -> int { throw std::runtime_error("no"); }), std::runtime_error);
-  EXPECT_EQ(worker.run_job([] { return 8; }), 8) << "a job that throws ends nothing";
+  EXPECT_EQ(worker.run_job([] { return 8; }), 8) << "the worker continues after a job that throws";
 }
 
-TEST(Worker, WakesWithoutFrames) {
+TEST(Worker, CallsAfterWithoutFrames) {
   std::promise<void> called;
   std::atomic<int> calls{0};
-  Worker<int> worker([](int) {},
-                     [&] {
-                       if (++calls == 1) called.set_value();
-                     });
-  worker.wake();  // before it starts: not lost
+  Worker worker([] { return false; },
+                [&] {
+                  if (++calls == 1) called.set_value();
+                });
+  worker.wake();
   worker.start();
   called.get_future().wait();
   worker.stop();
@@ -70,14 +95,15 @@ TEST(Worker, WakesWithoutFrames) {
 TEST(Worker, StopTellsJobsThatWait) {
   Gate gate;
   std::promise<void> began;
-  Worker<int> worker(
-      [&](int) {
+  Worker worker(
+      [&] {
         began.set_value();
         gate.open.wait();
+        return false;
       },
       [] {});
   worker.start();
-  worker.put(1);
+  worker.wake();
   began.get_future().wait();
   auto waiting = std::async(std::launch::async, [&] { worker.run_job([] {}); });
   auto stopped = std::async(std::launch::async, [&] { worker.stop(); });

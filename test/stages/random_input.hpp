@@ -50,15 +50,15 @@ class Random {
   std::mt19937 engine_;
 };
 
-struct Camera {
+struct CameraSetup {
   std::string name;
   Intrinsics intrinsics;
   Config config;
 };
 
 /// A camera whose grid has exactly `layers` layers: z_max lies a little before the centre of the last one, whatever the focal length.
-inline Camera make_camera(int width, int height, double fx, double fy, int layers, std::array<int, 3> padding = {5, 5, 2}) {
-  Camera camera;
+inline CameraSetup make_camera(int width, int height, double fx, double fy, int layers, std::array<int, 3> padding = {5, 5, 2}) {
+  CameraSetup camera;
   camera.name = std::to_string(width) + " x " + std::to_string(height) + " pixels, " + std::to_string(layers) + " layers";
   camera.intrinsics = {fx, fy, 0.5 * width - 0.43, 0.5 * height - 0.61, width, height};
   camera.config.decimation = 1;
@@ -72,8 +72,8 @@ inline Camera make_camera(int width, int height, double fx, double fy, int layer
 }
 
 /// Sizes on both sides of the borders of words (64 layers), tiles (8 x 8 x 32 voxels) and work-groups.
-inline std::vector<Camera> cameras() {
-  std::vector<Camera> all = {make_camera(7, 5, 10.3, 12.1, 33), make_camera(1, 1, 11.2, 11.2, 31, {1, 1, 1})};
+inline std::vector<CameraSetup> cameras() {
+  std::vector<CameraSetup> all = {make_camera(7, 5, 10.3, 12.1, 33), make_camera(1, 1, 11.2, 11.2, 31, {1, 1, 1})};
   if (small_tests()) return all;
   all.push_back(make_camera(33, 17, 22.7, 20.1, 64));
   all.push_back(make_camera(33, 17, 22.7, 20.1, 65, {3, 2, 4}));
@@ -86,7 +86,7 @@ inline std::vector<Camera> cameras() {
 enum class Content { mixed, all_valid, all_invalid };
 
 /// Depths between z_min and z_max with, in the mixed ones, holes and rays that met nothing up to z_max (negative).
-inline WorkingImage random_image(const Camera& camera, Content content, Random& random) {
+inline WorkingImage random_image(const CameraSetup& camera, Content content, Random& random) {
   WorkingImage image;
   image.intrinsics = camera.intrinsics;
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;

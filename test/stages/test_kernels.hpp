@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "opencl/kernel_files.hpp"
-#include "stages_probe.hpp"
+#include "random_input.hpp"
+#include "test_device.hpp"
 
 namespace frontier_surfels {
 

@@ -10,7 +10,7 @@
 
 namespace frontier_surfels::scoring {
 
-/// Shares between 0 and 1; see the README for each.
+/// Shares between 0 and 1; doc/method.md defines each.
 struct ExactScore {
   // Per surfel. right + buried + floating + flipped = 1.
   double right = 0;                     ///< not known(p - kBackProbe r n) and known(p + kFrontProbe r n)

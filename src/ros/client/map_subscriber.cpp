@@ -25,7 +25,7 @@ void UpdateReceiver::receive(const SurfelUpdate& update) {
     if (!joining) ++gaps_;
     if (update.sequence <= map_.sequence() || update.since > map_.sequence()) return;
   }
-  // One that starts earlier than this map contains more than is missing, which does no harm.
+  // An update that begins before this map contains more than is missing, which does no harm.
   map_.apply(changes, map_.sequence());
 }
 
@@ -34,10 +34,10 @@ void UpdateReceiver::take_all() { map_.apply(get_all_(), 0); }
 MapSubscriber::MapSubscriber(ros::NodeHandle& nh, const std::string& mapper)
     : get_surfels_(nh.serviceClient<GetSurfels>(mapper + "/get_surfels")),
       receiver_([this] { return ask_for_all(); }),
-      updates_(nh.subscribe(mapper + "/update", 0, &MapSubscriber::on_update, this)) {}  // 0: none is dropped on this side
+      updates_(nh.subscribe(mapper + "/update", 0, &MapSubscriber::on_update, this)) {}  // a queue of any length: no update is dropped here
 
 Changes MapSubscriber::ask_for_all() {
-  GetSurfels service;  // both corners are the same: everything
+  GetSurfels service;  // both corners are equal, which asks for all surfels
   if (!get_surfels_.call(service))
     throw Error("The service " + get_surfels_.getService() + " did not answer: is the mapper still running?");
   return {service.response.sequence, messages::to_surfels(service.response.surfels), {}};

@@ -1,4 +1,4 @@
-/// The other end of ~update: a copy of a running mapper's map.
+/// A copy of a running mapper's map, for programs that subscribe ~update.
 #pragma once
 
 #include <frontier_surfels/SurfelUpdate.h>
@@ -13,23 +13,23 @@
 
 namespace frontier_surfels {
 
-/// Applies updates to a copy of the map; asks for the whole map where some are missing. No ROS communication in it.
+/// Applies updates to a copy of the map. If updates are missing, it asks for the whole map. It contains no ROS communication.
 class UpdateReceiver {
  public:
-  /// The whole map, with its number: what ~get_surfels answers. May throw; the next update tries again.
+  /// Gets the whole map with its number, as ~get_surfels answers it. If it throws, the next update tries again.
   using GetAll = std::function<Changes()>;
 
   explicit UpdateReceiver(GetAll get_all);
 
-  /// The rules are those of msg/SurfelUpdate.msg. @throws Error if the message cannot be understood, and whatever GetAll throws; the map
-  /// stays as it was then
+  /// Follows the rules of msg/SurfelUpdate.msg.
+  /// @throws Error if the message is damaged, and whatever GetAll throws; the map is then as before
   void receive(const SurfelUpdate& update);
 
-  /// Takes the whole map instead of what is here. @throws whatever GetAll throws
+  /// Replaces the copy by the whole map. @throws whatever GetAll throws
   void take_all();
 
   const SurfelMirror& map() const { return map_; }
-  std::size_t gaps() const { return gaps_; }  ///< between updates that were noticed and healed; joining late is none
+  std::size_t gaps() const { return gaps_; }  ///< how often updates were missing; joining late does not count
 
  private:
   GetAll get_all_;
@@ -37,8 +37,8 @@ class UpdateReceiver {
   std::size_t gaps_ = 0;
 };
 
-/// An UpdateReceiver on the topics and services of the mapper node `mapper`. The callback queue of `nh` changes the map: whoever handles
-/// that queue may read it.
+/// An UpdateReceiver with the topics and services of the mapper node `mapper`. Callbacks in the queue of `nh` change the map, so that only
+/// the thread that handles this queue may read it.
 class MapSubscriber {
  public:
   MapSubscriber(ros::NodeHandle& nh, const std::string& mapper);
@@ -49,7 +49,7 @@ class MapSubscriber {
   std::size_t gaps() const { return receiver_.gaps(); }
   bool connected() const { return updates_.getNumPublishers() > 0; }
 
-  /// Asks for the whole map, for when updates fail to come. @throws Error
+  /// Asks for the whole map, for the case that updates do not come. @throws Error if the mapper does not answer
   void take_all() { receiver_.take_all(); }
 
  private:

@@ -18,20 +18,20 @@ using messages::strip_slash;
 using XmlRpc::XmlRpcValue;
 
 constexpr double kStartTimeout = 20;  // [s]
-constexpr double kGone = 2;           // [s] without a connection
+constexpr double kGone = 2;           // [s] without a connection, after which the mapper must have ended
 constexpr double kMapTimeout = 60;    // [s]
 const char* const kHowToStart = "start it with `roslaunch frontier_surfels mapper.launch`";
 
-/// A node handle's constructor would wait for a master forever.
+/// Checks that there is a master, because the constructor of a node handle would wait for it forever.
 const std::string& with_master(const std::string& name) {
   if (!ros::master::check()) {
-    throw Error("There is no ROS master at " + ros::master::getURI() + ", and so no mapper: " + kHowToStart +
+    throw Error("There is no ROS master at " + ros::master::getURI() + ", and therefore no mapper: " + kHowToStart +
                 ", or set ROS_MASTER_URI to where it runs.");
   }
   return name;
 }
 
-/// The node that publishes a topic, as the master knows it; empty if there is none.
+/// The node that publishes a topic according to the master; empty if there is none.
 std::string publisher_of(const std::string& topic) {
   XmlRpcValue request(ros::names::resolve("~")), response, state;
   if (!ros::master::execute("getSystemState", request, response, state, false)) return {};
@@ -56,7 +56,8 @@ RunningMapper::RunningMapper(const std::string& name, std::function<bool()> stop
       [this] {
         return report_topic_.getNumPublishers() > 0 && map_->connected() && !(process_ = publisher_of(report_topic_.getTopic())).empty();
       },
-      "There is no mapper " + name_ + ", as nobody publishes " + name_ + "/report: " + kHowToStart + ", or name another with --mapper.");
+      "There is no mapper " + name_ + ", because no node publishes " + name_ + "/report: " + kHowToStart +
+          ", or name another with --mapper.");
   config_ = read_mapper_config(name_);
   world_frame_ = strip_slash(ros::param::param(name_ + "/world_frame", NodeConfig().world_frame));
 }
@@ -87,10 +88,10 @@ FrameReport RunningMapper::report_on(const ros::Time& stamp, double timeout) {
       },
       timeout);
   if (found) return *found;
-  if (gone) throw Error("The mapper " + name_ + " has gone in the middle of the recording: see what it said last, and start it again.");
+  if (gone) throw Error("The mapper " + name_ + " has ended during the replay: read its last messages, and start it again.");
   std::ostringstream text;
   text << "The mapper " << name_ << " has not reported on the depth image of stamp " << stamp << " within " << timeout
-       << " s: see whether it still runs and what it says, and start it again.";
+       << " s: check whether it still runs, read its last messages, and start it again.";
   throw Error(text.str());
 }
 
@@ -106,7 +107,7 @@ void RunningMapper::require(const std::function<bool()>& done, const std::string
 }
 
 bool RunningMapper::wait_until(const std::function<bool()>& done, double timeout) {
-  constexpr double kPoll = 0.02;  // [s]; a callback ends the wait at once
+  constexpr double kPoll = 0.02;  // [s] at most; a callback ends it at once
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(timeout);
   while (!done()) {
     if (ros::WallTime::now() >= end) return false;

@@ -6,10 +6,12 @@
 #include <sensor_msgs/image_encodings.h>
 
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 namespace frontier_surfels::messages {
 namespace {
@@ -17,7 +19,7 @@ namespace {
 namespace encodings = sensor_msgs::image_encodings;
 constexpr bool kThisMachineIsBigEndian = BOOST_ENDIAN_BIG_BYTE;
 
-/// Checks that an image has the bytes that its size asks for. In 64 bits: damaged sizes overflow 32.
+/// Checks that an image has as many bytes as its size asks for. Computes in 64 bits, because damaged sizes overflow 32.
 void check_size(const sensor_msgs::Image& image, std::size_t bytes_per_pixel) {
   const std::uint64_t bytes = static_cast<std::uint64_t>(image.step) * image.height;
   if (image.width == 0 || image.height == 0) throw BadFrame("the image is empty");
@@ -27,23 +29,58 @@ void check_size(const sensor_msgs::Image& image, std::size_t bytes_per_pixel) {
   if (image.step < static_cast<std::uint64_t>(image.width) * bytes_per_pixel) throw BadFrame("the image's step is shorter than its rows");
 }
 
-/// Copies depth into rows without gaps and into this machine's byte order. cv_bridge does not: it gives two channels of bytes where the
-/// order differs.
-cv::Mat unpack_depth(const sensor_msgs::Image& image, int type) {
-  const std::size_t size = CV_ELEM_SIZE(type);
-  check_size(image, size);
-  cv::Mat depth(static_cast<int>(image.height), static_cast<int>(image.width), type);
-  const bool swap = static_cast<bool>(image.is_bigendian) != kThisMachineIsBigEndian;
-  for (int row = 0; row < depth.rows; ++row) {
-    std::uint8_t* values = depth.ptr(row);
-    std::memcpy(values, &image.data[static_cast<std::size_t>(row) * image.step], size * image.width);
-    if (!swap) continue;
-    for (std::uint32_t column = 0; column < image.width; ++column) std::reverse(values + size * column, values + size * (column + 1));
-  }
-  return depth;
+template <typename View>
+Pixels<View> view(const sensor_msgs::ImageConstPtr& image) {
+  Pixels<View> pixels;
+  pixels.view.width = static_cast<int>(image->width);
+  pixels.view.height = static_cast<int>(image->height);
+  pixels.view.step = image->step;
+  pixels.view.data = image->data.data();
+  pixels.owner = image;
+  return pixels;
 }
 
-cv::Mat unpack_color(const sensor_msgs::Image& image) {
+template <typename View>
+Pixels<View> view(const cv::Mat& decoded) {
+  Pixels<View> pixels;
+  pixels.view.width = decoded.cols;
+  pixels.view.height = decoded.rows;
+  pixels.view.step = decoded.step[0];
+  pixels.view.data = decoded.data;
+  pixels.owner = boost::make_shared<cv::Mat>(decoded);
+  return pixels;
+}
+
+Pixels<DepthImage> view_depth(const cv::Mat& decoded) {
+  Pixels<DepthImage> pixels = view<DepthImage>(decoded);
+  pixels.view.encoding = decoded.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  return pixels;
+}
+
+Pixels<DepthImage> view_depth(const sensor_msgs::ImageConstPtr& image, DepthImage::Encoding encoding) {
+  check_size(*image, encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4);
+  Pixels<DepthImage> pixels = view<DepthImage>(image);
+  pixels.view.encoding = encoding;
+  pixels.view.swap_bytes = static_cast<bool>(image->is_bigendian) != kThisMachineIsBigEndian;
+  return pixels;
+}
+
+/// @param decoded  CV_8UC3 in BGR order
+Pixels<ColorImage> view_color(const cv::Mat& decoded) {
+  Pixels<ColorImage> pixels = view<ColorImage>(decoded);
+  pixels.view.order = ColorImage::Order::kBgr;
+  return pixels;
+}
+
+Pixels<ColorImage> view_color(const sensor_msgs::ImageConstPtr& image, ColorImage::Order order, int channels) {
+  check_size(*image, static_cast<std::size_t>(channels));
+  Pixels<ColorImage> pixels = view<ColorImage>(image);
+  pixels.view.order = order;
+  pixels.view.channels = channels;
+  return pixels;
+}
+
+cv::Mat convert_color(const sensor_msgs::Image& image) {
   check_size(image, 1);
   try {
     return cv_bridge::toCvCopy(image, encodings::BGR8)->image;
@@ -89,17 +126,51 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 
 }  // namespace
 
-cv::Mat depth_image(const ImageMessage& message) {
-  if (message.compressed) return decode_depth(*message.compressed);
+Pixels<DepthImage> depth_pixels(const ImageMessage& message) {
+  if (message.compressed) return view_depth(decode_depth(*message.compressed));
   const std::string& encoding = message.raw->encoding;
-  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16) return unpack_depth(*message.raw, CV_16UC1);
-  if (encoding == encodings::TYPE_32FC1) return unpack_depth(*message.raw, CV_32FC1);
+  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16)
+    return view_depth(message.raw, DepthImage::Encoding::kMillimetresU16);
+  if (encoding == encodings::TYPE_32FC1) return view_depth(message.raw, DepthImage::Encoding::kMetresF32);
   throw BadFrame("the encoding '" + encoding + "' is not one of depth (16UC1, mono16, 32FC1)");
 }
 
-cv::Mat color_image(const ImageMessage& message) {
-  if (message.raw) return unpack_color(*message.raw);
-  return decode(message.compressed->data.data(), message.compressed->data.size(), cv::IMREAD_COLOR);
+Pixels<ColorImage> color_pixels(const ImageMessage& message) {
+  if (message.compressed) return view_color(decode(message.compressed->data.data(), message.compressed->data.size(), cv::IMREAD_COLOR));
+  const std::string& encoding = message.raw->encoding;
+  if (encoding == encodings::RGB8) return view_color(message.raw, ColorImage::Order::kRgb, 3);
+  if (encoding == encodings::BGR8) return view_color(message.raw, ColorImage::Order::kBgr, 3);
+  if (encoding == encodings::RGBA8) return view_color(message.raw, ColorImage::Order::kRgb, 4);
+  if (encoding == encodings::BGRA8) return view_color(message.raw, ColorImage::Order::kBgr, 4);
+  return view_color(convert_color(*message.raw));
+}
+
+std::optional<cv::Size> stated_size(const ImageMessage& message) {
+  if (!message.raw) return std::nullopt;
+  return cv::Size(static_cast<int>(message.raw->width), static_cast<int>(message.raw->height));
+}
+
+cv::Mat copy(const DepthImage& image) {
+  cv::Mat depth(image.height, image.width, image.encoding == DepthImage::Encoding::kMillimetresU16 ? CV_16UC1 : CV_32FC1);
+  const std::size_t size = depth.elemSize();
+  for (int row = 0; row < depth.rows; ++row) {
+    std::uint8_t* values = depth.ptr(row);
+    std::memcpy(values, static_cast<const std::uint8_t*>(image.data) + static_cast<std::size_t>(row) * image.step, size * image.width);
+    if (!image.swap_bytes) continue;
+    for (int column = 0; column < depth.cols; ++column) std::reverse(values + size * column, values + size * (column + 1));
+  }
+  return depth;
+}
+
+cv::Mat copy(const ColorImage& image) {
+  const cv::Mat viewed(image.height, image.width, CV_8UC(image.channels), const_cast<std::uint8_t*>(image.data), image.step);
+  if (image.order == ColorImage::Order::kBgr && image.channels == 3) return viewed.clone();
+  cv::Mat bgr;
+  if (image.order == ColorImage::Order::kBgr)
+    cv::cvtColor(viewed, bgr, cv::COLOR_BGRA2BGR);
+  else
+    cv::cvtColor(viewed, bgr, image.channels == 3 ? cv::COLOR_RGB2BGR : cv::COLOR_RGBA2BGR);
+  return bgr;
 }
 
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {

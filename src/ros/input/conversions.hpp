@@ -1,4 +1,4 @@
-/// Images, cameras and poses of ROS messages as this library wants them.
+/// Images, cameras and poses of ROS messages as the types of this library.
 #pragma once
 
 #include <geometry_msgs/Transform.h>
@@ -7,13 +7,14 @@
 #include <sensor_msgs/Image.h>
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::messages {
 
-/// An image as it was recorded, raw or compressed: one of the two is set.
+/// A message with an image, raw or compressed: exactly one of the two is set, or none if there is no image.
 struct ImageMessage {
   sensor_msgs::ImageConstPtr raw;
   sensor_msgs::CompressedImageConstPtr compressed;
@@ -22,41 +23,61 @@ struct ImageMessage {
   const std_msgs::Header& header() const { return raw ? raw->header : compressed->header; }
 };
 
-/// Depth as CV_16UC1 [mm] or CV_32FC1 [m] in this machine's byte order; 0 or NaN = no measurement. Raw: 16UC1, mono16, 32FC1.
-/// Compressed: PNG of 16 bits, or compressedDepth's PNG of 16UC1 or of the quantised inverse of 32FC1. @throws BadFrame
-cv::Mat depth_image(const ImageMessage& message);
+/// A view of pixels where they lie, and what keeps them alive: the message itself, or the image that was decoded from it.
+template <typename View>
+struct Pixels {
+  View view;
+  boost::shared_ptr<const void> owner;
+};
 
-/// Colour or grey as CV_8UC3 in BGR order. @throws BadFrame
-cv::Mat color_image(const ImageMessage& message);
+/// The pixels of a depth image. 0 or NaN means that there is no measurement.
+/// A raw message (16UC1, mono16 or 32FC1, in either byte order) is not copied. A compressed one is decoded: a PNG of 16 bits, or
+/// compressedDepth's PNG of 16UC1 or of the quantised inverse of 32FC1.
+/// @throws BadFrame if the encoding is another one, or the data do not fit the size
+Pixels<DepthImage> depth_pixels(const ImageMessage& message);
 
-/// Pinhole camera of the images that come with `info`: the rectified P where there is one, else K; binning and region of interest applied.
-/// Width and height are 0 where the message does not say them. @throws BadFrame
+/// The pixels of a colour image. A raw message of rgb8, bgr8, rgba8 or bgra8 is not copied. All other encodings (grey, Bayer, 16 bits) are
+/// converted by cv_bridge, and compressed images are decoded.
+/// @throws BadFrame if the encoding is unknown, or the data do not fit the size
+Pixels<ColorImage> color_pixels(const ImageMessage& message);
+
+/// Width and height as a raw message states them; empty for a compressed one, whose size is known only after decoding.
+std::optional<cv::Size> stated_size(const ImageMessage& message);
+
+/// A copy that owns its pixels: CV_16UC1 [mm] or CV_32FC1 [m], in this machine's byte order and without gaps between rows.
+cv::Mat copy(const DepthImage& image);
+
+/// A copy that owns its pixels: CV_8UC3 in BGR order, without gaps between rows.
+cv::Mat copy(const ColorImage& image);
+
+/// The pinhole camera that `info` describes: its rectified P where there is one, else K, with binning and region of interest applied.
+/// Width and height are 0 where the message does not state them. @throws BadFrame if a number is not finite or a focal length not positive
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info);
 
-/// The same for the depth images that come with it, of `image_size`. @throws BadFrame if it is of another size
+/// The same for a depth image of `image_size` pixels. @throws BadFrame also if the message states another size
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& image_size);
 
-/// A rigid transform, of whatever quaternion. @throws BadFrame if it is not finite
+/// A rigid transform; the quaternion is normalised. @throws BadFrame if it is not finite, or the quaternion is 0
 Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
 
-/// Colour belongs to a depth image if it was taken so little before or after it [s].
+/// Largest difference of stamps between a depth image and the colour image that belongs to it [s].
 constexpr double kColorTolerance = 0.030;
 
-/// From one time to the other [s]. ros::Duration throws where stamps are senseless.
+/// The time from `from` to `to` [s]. Unlike ros::Duration it never throws, however far apart the stamps are.
 inline double seconds(const ros::Time& from, const ros::Time& to) {
   return 1e-9 * static_cast<double>(static_cast<std::int64_t>(to.toNSec() - from.toNSec()));
 }
 
-/// A name as tf2 wants it: "/world" -> "world".
+/// The name without leading slashes, which tf2 does not accept: "/world" becomes "world".
 std::string strip_slash(const std::string& name);
 
-/// compressedDepth's way to put metres into 16 bits: value = a / depth + b, 0 = no measurement.
+/// How compressedDepth stores metres in 16 bits: value = a / depth + b; 0 = no measurement.
 struct InverseDepthQuantisation {
   float a;
   float b;
 };
 
-/// What stands before the PNG in a compressedDepth message.
+/// The bytes before the PNG in a compressedDepth message.
 struct CompressedDepthHeader {
   std::int32_t format;  ///< unused
   InverseDepthQuantisation quantisation;

@@ -11,15 +11,18 @@ namespace frontier_surfels {
 
 using messages::strip_slash;
 
-FramePoses::FramePoses(const ros::NodeHandle& nh, std::string world_frame)
-    : world_frame_(strip_slash(world_frame)), listener_(buffer_, nh, true) {}
+FramePoses::FramePoses(const std::string& world_frame) : world_frame_(strip_slash(world_frame)) {}
 
-bool FramePoses::has(const std::string& frame, const ros::Time& stamp, std::string* why) const {
-  const std::string camera = strip_slash(frame);  // of the world frame itself tf knows the identity, which is no camera's pose
-  return camera != world_frame_ && buffer_.canTransform(world_frame_, camera, stamp, why);
+void FramePoses::start(const ros::NodeHandle& nh) { listener_.emplace(buffer_, nh, true); }
+
+bool FramePoses::has(const std::string& frame, const ros::Time& stamp) const {
+  const std::string camera = strip_slash(frame);
+  // tf would answer the identity for the world frame itself, which is no camera's pose.
+  return !camera.empty() && camera != world_frame_ && buffer_.canTransform(world_frame_, camera, stamp);
 }
 
 Eigen::Isometry3d FramePoses::T_world_frame(const std::string& frame, const ros::Time& stamp) const {
+  if (!has(frame, stamp)) throw BadFrame(explain(frame, stamp));
   try {
     return messages::to_isometry(buffer_.lookupTransform(world_frame_, strip_slash(frame), stamp).transform);
   } catch (const tf2::TransformException& error) {
@@ -27,8 +30,10 @@ Eigen::Isometry3d FramePoses::T_world_frame(const std::string& frame, const ros:
   }
 }
 
+/// Which transform is missing, or how old the newest one is.
 std::string FramePoses::explain(const std::string& frame, const ros::Time& stamp) const {
   const std::string camera = strip_slash(frame), between = "from '" + camera + "' to '" + world_frame_ + "'";
+  if (camera.empty()) return "the image's header names no frame: its driver must set frame_id";
   if (camera == world_frame_) return "the image's frame is the world frame '" + world_frame_ + "' itself: set ~world_frame";
   const ros::Time any;
   std::string why;
@@ -42,18 +47,18 @@ std::string FramePoses::explain(const std::string& frame, const ros::Time& stamp
     text << "tf's newest transform " << between << " is " << std::abs(ahead) << " s " << (ahead > 0 ? "older" : "newer")
          << " than the image: "
          << (ahead > 0 ? "raise ~tf_timeout, or check the clocks of camera and tf" : "the image comes too late for tf's memory");
-  } catch (const tf2::TransformException& error) {  // gone in between
+  } catch (const tf2::TransformException& error) {  // the transforms have been cleared meanwhile
     text << error.what();
   }
   return text.str();
 }
 
 void FramePoses::forget_future(const std::string& frame, const ros::Time& stamp) {
-  constexpr double kFuture = 2;  // [s]; a little may be there rightly, from a replay that sends tf ahead
+  constexpr double kFuture = 2;  // [s]; transforms that are less far ahead may be right, because a replay may send them ahead
   try {
     const ros::Time newest = buffer_.lookupTransform(world_frame_, strip_slash(frame), ros::Time()).header.stamp;
     if (messages::seconds(stamp, newest) > kFuture) buffer_.clear();
-  } catch (const tf2::TransformException&) {  // nothing there, so nothing to forget
+  } catch (const tf2::TransformException&) {  // there is nothing to forget
   }
 }
 

@@ -1,4 +1,4 @@
-/// Poses of the camera from tf.
+/// Poses of cameras from tf.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -6,31 +6,39 @@
 #include <tf2_ros/transform_listener.h>
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 
 namespace frontier_surfels {
 
-/// Listens to tf and tf_static on a thread of its own. A pose is the one at its stamp, or none: never the identity, never the latest.
+/// Transforms of tf and tf_static. A pose is the one at its stamp: never the identity, and never the latest one instead. Frames may be
+/// named with leading slashes. All functions may be called from any thread.
 class FramePoses {
  public:
-  FramePoses(const ros::NodeHandle& nh, std::string world_frame);
+  explicit FramePoses(const std::string& world_frame);
 
-  /// Whether T_world_frame would answer now. @param why  otherwise, if not null: tf's reason
-  bool has(const std::string& frame, const ros::Time& stamp, std::string* why = nullptr) const;
+  /// Listens to tf and tf_static on a thread of its own.
+  void start(const ros::NodeHandle& nh);
 
-  /// @throws BadFrame if it is not known
+  /// Where the transforms are kept.
+  tf2::BufferCore& buffer() { return buffer_; }
+
+  /// Whether the pose at this stamp is known now.
+  bool has(const std::string& frame, const ros::Time& stamp) const;
+
+  /// The pose of `frame` in the world frame. @throws BadFrame if it is not known, with the reason
   Eigen::Isometry3d T_world_frame(const std::string& frame, const ros::Time& stamp) const;
 
-  /// Why it is not known, for people: which frames there are, or how old the newest transform is.
-  std::string explain(const std::string& frame, const ros::Time& stamp) const;
-
-  /// Time has jumped back to `stamp`: forgets transforms of the future. tf's own listener does so, too, but only if it sees /clock first.
+  /// Time has jumped back to `stamp`: transforms of later times are forgotten. tf's own listener forgets them only if it receives /clock
+  /// before the new transforms.
   void forget_future(const std::string& frame, const ros::Time& stamp);
 
  private:
-  std::string world_frame_;
+  std::string explain(const std::string& frame, const ros::Time& stamp) const;
+
+  const std::string world_frame_;
   tf2::BufferCore buffer_;
-  tf2_ros::TransformListener listener_;
+  std::optional<tf2_ros::TransformListener> listener_;
 };
 
 }  // namespace frontier_surfels

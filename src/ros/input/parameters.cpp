@@ -15,7 +15,7 @@ namespace {
 
 using XmlRpc::XmlRpcValue;
 
-/// Sets a field from a parameter. @return what the parameter must be, or null
+/// Sets a field from a parameter. @return null, or a description of what the parameter must be
 const char* assign(XmlRpcValue& value, bool& field) {
   if (value.getType() != XmlRpcValue::TypeBoolean) return "true or false";
   field = static_cast<bool>(value);
@@ -47,7 +47,7 @@ std::string shown(const XmlRpcValue& value) {
   return text.str();
 }
 
-/// Parameters of a namespace, by name without it; structs (other things' namespaces) are left out.
+/// The parameters of a namespace, by their names in it. Namespaces within it are left out.
 std::map<std::string, XmlRpcValue> list_parameters(const std::string& name_space) {
   std::map<std::string, XmlRpcValue> parameters;
   XmlRpcValue all;
@@ -58,7 +58,7 @@ std::map<std::string, XmlRpcValue> list_parameters(const std::string& name_space
   return parameters;
 }
 
-/// For for_each_field: takes the values there are. What is taken leaves `parameters`.
+/// A visitor for for_each_field: sets the fields that have a parameter, and removes those parameters from the list.
 class Reader {
  public:
   Reader(std::map<std::string, XmlRpcValue>& parameters, std::string& faults) : parameters_(parameters), faults_(faults) {}
@@ -99,10 +99,11 @@ std::vector<std::string> NodeConfig::problems() const {
     }
   });
   if (messages::strip_slash(world_frame).empty())
-    faults.push_back("world_frame is empty: it must be the tf frame that the map stands still in.");
-  if (on_time_jump != "keep" && on_time_jump != "reset") {
+    faults.push_back("world_frame is empty: it must be the tf frame in which the map does not move.");
+  if (on_time_jump != "keep" && on_time_jump != "reset")
     faults.push_back("on_time_jump is '" + on_time_jump + "': it must be keep or reset.");
-  }
+  if (cloud_confidence != "frontier" && cloud_confidence != "occupied")
+    faults.push_back("cloud_confidence is '" + cloud_confidence + "': it must be frontier or occupied.");
   return faults;
 }
 

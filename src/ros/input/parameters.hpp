@@ -1,4 +1,4 @@
-/// The node's parameters: those of the mapper, and those of its place among ROS nodes.
+/// The parameters of the node: those of the mapper, and those of its inputs and outputs.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
 
-/// Everything under `~`.
+/// All parameters under `~`.
 struct NodeConfig {
   Config mapper;
   std::string world_frame = "map";
@@ -21,33 +22,43 @@ struct NodeConfig {
   std::string on_time_jump = "keep";
   double publish_period = 1.0;
   int marker_limit = 100000;
+  std::string cloud_confidence = "frontier";
 
   /// Every fault, one sentence each, the mapper's included; empty when the configuration can be used.
   std::vector<std::string> problems() const;
+
+  /// The label that cloud_confidence names.
+  Label confident_label() const { return cloud_confidence == "occupied" ? Label::kOccupied : Label::kFrontier; }
 };
 
-/// visit(FieldInfo, field) for every field of NodeConfig but the mapper's, in order; see for_each_field.
+/// Calls visit(FieldInfo, field) for every field of NodeConfig except `mapper`, in order; see for_each_field.
 template <typename ConfigT, typename Visitor>
 void for_each_node_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"world_frame", "", "tf frame of the map"}, config.world_frame);
-  visit(FieldInfo{"image_transport", "", "of the depth images: raw, compressedDepth, or any other that is installed"},
+  visit(FieldInfo{"image_transport", "", "transport of the depth images: raw, compressedDepth, or any other that is installed"},
         config.image_transport);
-  visit(FieldInfo{"use_color", "", "occupied surfels take the colour of color/image, registered to depth, where there is one"},
+  visit(FieldInfo{"use_color", "", "whether occupied surfels take their colour from color/image, which must be registered to depth"},
         config.use_color);
-  visit(FieldInfo{"color_transport", "", "of the colour images: raw, compressed, or any other that is installed"}, config.color_transport);
-  visit(FieldInfo{"tf_timeout", "s", "how long an image waits for its pose", 0, 10}, config.tf_timeout);
-  visit(FieldInfo{"on_time_jump", "", "when time goes back, as with a looping bag: keep or reset the map"}, config.on_time_jump);
-  visit(FieldInfo{"publish_period", "s", "whole clouds and markers are published at most this often; large maps less often", 0.05, 3600},
+  visit(FieldInfo{"color_transport", "", "transport of the colour images: raw, compressed, or any other that is installed"},
+        config.color_transport);
+  visit(FieldInfo{"tf_timeout", "s", "how long an image waits for its pose and its camera_info", 0, 10}, config.tf_timeout);
+  visit(FieldInfo{"on_time_jump", "", "what becomes of the map when time jumps back, as when a bag loops: keep or reset"},
+        config.on_time_jump);
+  visit(FieldInfo{"publish_period", "s", "shortest time between two whole clouds or markers; it is longer for large maps", 0.05, 3600},
         config.publish_period);
-  visit(FieldInfo{"marker_limit", "surfel", "discs shown by ~markers; beyond that they are merged to larger ones", 100, 10000000},
+  visit(FieldInfo{"marker_limit", "surfel", "maximum number of discs in ~markers; beyond it, surfels are merged to larger discs", 100,
+                  10000000},
         config.marker_limit);
+  visit(FieldInfo{"cloud_confidence", "", "which surfels have confidence 1 in point clouds, all others having 0: frontier or occupied"},
+        config.cloud_confidence);
 }
 
-/// Reads all parameters of `pnh`'s namespace. @throws Error with every fault: wrong types, values out of range
-/// @param warnings  a sentence for every parameter there that is none of ours, with the nearest name
+/// Reads all parameters in the namespace of `pnh`.
+/// @param warnings  gets a sentence for every unknown parameter there, with the known name that is most like it
+/// @throws Error with every fault: wrong types, values out of range
 NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>* warnings);
 
-/// Reads the mapper's parameters of a node that runs already, by its name. @throws Error
+/// Reads the parameters of the mapper in a running node of this name. @throws Error with every fault
 Config read_mapper_config(const std::string& node);
 
 }  // namespace frontier_surfels

@@ -18,22 +18,22 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kMostWaiting = 4;                                           // pushes; then no more are wanted
-constexpr std::uint32_t kUpdatesQueue = 50, kMarkersQueue = 20, kCloudQueue = 1;  // messages, for a slow subscriber
-constexpr int kNiceness = 10;                                                     // the mapping itself comes first
-constexpr double kShare = 0.1;  // of a core, for publishing at most: who sends and who receives a large map take as much again
+constexpr std::size_t kMostWaiting = 4;                                           // pushes; beyond that, none are wanted
+constexpr std::uint32_t kUpdatesQueue = 50, kMarkersQueue = 20, kCloudQueue = 1;  // messages for a slow subscriber
+constexpr int kNiceness = 10;                                                     // mapping comes first
+constexpr double kShare = 0.1;  // of a core, at most, for publishing; sending and receiving a large map take as much again
 
-/// Of a single thread, as Linux has it. A refusal does no harm.
+/// Sets the niceness of one thread, which only Linux can. If it is refused, nothing is lost.
 void set_niceness(int thread_id, int niceness) { setpriority(PRIO_PROCESS, static_cast<id_t>(thread_id), niceness); }
 
-/// Of the calling thread [s].
+/// CPU time of the calling thread [s].
 double cpu_time() {
   timespec time = {};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Whether a subscriber lives in this process, as another nodelet does.
+/// Whether a subscriber is in this process, like another nodelet of the same manager.
 bool is_within(const ros::SingleSubscriberPublisher& link) { return link.getSubscriberName() == ros::this_node::getName(); }
 
 std::size_t size(const PushedChanges& pushed) { return pushed.changes.updated.size() + pushed.changes.removed.size(); }
@@ -41,10 +41,10 @@ std::size_t size(const PushedChanges& pushed) { return pushed.changes.updated.si
 }  // namespace
 
 void enqueue(std::deque<PushedChanges>& queue, PushedChanges pushed, std::size_t most) {
-  if (pushed.since == 0) queue.clear();  // a whole map: nothing before it matters
+  if (pushed.since == 0) queue.clear();  // a whole map makes everything before it useless
   queue.push_back(std::move(pushed));
   if (queue.size() <= most) return;
-  // The smallest two: so a surfel is copied a few times only, however long nothing is taken from the queue.
+  // Merging the two smallest neighbours copies every surfel only a few times, however long nothing is taken from the queue.
   std::size_t first = 0;
   for (std::size_t i = 1; i + 1 < queue.size(); ++i)
     if (size(queue[i]) + size(queue[i + 1]) < size(queue[first]) + size(queue[first + 1])) first = i;
@@ -56,6 +56,7 @@ void enqueue(std::deque<PushedChanges>& queue, PushedChanges pushed, std::size_t
 
 MapPublisher::MapPublisher(ros::NodeHandle pnh, const NodeConfig& config, std::function<void()> wake)
     : world_frame_(config.world_frame),
+      confident_(config.confident_label()),
       period_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(config.publish_period))),
       wake_(std::move(wake)),
       markers_(config.world_frame, static_cast<std::size_t>(config.marker_limit)) {
@@ -84,14 +85,14 @@ MapPublisher::~MapPublisher() {
     stopping_ = true;
   }
   changed_.notify_all();
-  if (thread_id_ != 0) set_niceness(thread_id_, 0);  // where it may: nobody waits for the mapping any more, but somebody for this
+  if (thread_id_ != 0) set_niceness(thread_id_, 0);  // if it is allowed to: mapping has ended, and the process waits for this thread
   thread_.join();
-  for (ros::Publisher& publisher : publishers_) publisher.shutdown();  // no callback comes after this
+  for (ros::Publisher& publisher : publishers_) publisher.shutdown();  // ends the callbacks
 }
 
 bool MapPublisher::is_heard(Topic topic) const { return publishers_[topic].getNumSubscribers() > 0; }
 
-/// With mutex_ held.
+/// Whether changes are wanted. To be called with mutex_ locked.
 bool MapPublisher::is_welcome() const {
   if (is_heard(kUpdate)) return queue_.size() + taken_ < kMostWaiting;
   return queue_.empty() && taken_ == 0 && Clock::now() >= next_time_.load();
@@ -112,7 +113,7 @@ void MapPublisher::push(Changes changes, std::uint64_t since, const MapState& st
   const std::uint64_t sequence = changes.sequence;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (since != 0 && since != pushed_) return;  // start_over() has come between: the next push is a whole map
+    if (since != 0 && since != pushed_) return;  // start_over() was called meanwhile: the next push is the whole map
     try {
       enqueue(queue_, {std::move(changes), since, state}, kMostWaiting);
     } catch (...) {
@@ -145,13 +146,13 @@ void MapPublisher::run() {
       publish_what_is_due();
       ask_again();
     } catch (const std::exception& fault) {
-      ROS_WARN_THROTTLE(5, "Publishing the map failed, and goes on: %s", fault.what());
-      start_over();  // something may have been lost
+      ROS_WARN_THROTTLE(5, "Publishing the map failed and is tried again: %s", fault.what());
+      start_over();  // changes may have been lost
     }
   }
 }
 
-/// Until somebody calls or something is due. @return what has been pushed
+/// Waits until there is something to do. @return what has been pushed
 std::deque<PushedChanges> MapPublisher::wait() {
   const std::optional<Clock::time_point> time = next_time();
   std::deque<PushedChanges> queue;
@@ -172,7 +173,7 @@ std::deque<PushedChanges> MapPublisher::wait() {
   return queue;
 }
 
-/// Asks for what wants_changes() did not want, if it is welcome now.
+/// Asks for the changes that wants_changes() refused, if they are wanted now.
 void MapPublisher::ask_again() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -183,7 +184,7 @@ void MapPublisher::ask_again() {
   wake_();
 }
 
-/// When there will be something to do though nobody calls.
+/// When something will be due; empty if nothing will.
 std::optional<MapPublisher::Clock::time_point> MapPublisher::next_time() const {
   for (const Topic topic : {kSurfels, kOccupied, kFrontier, kMarkers})
     if (is_stale(topic)) return next_time_;
@@ -194,7 +195,8 @@ bool MapPublisher::is_stale(Topic topic) const {
   return map_.sequence() != 0 && sent_[topic] != (topic == kMarkers ? pushes_ : version_) && is_heard(topic);
 }
 
-/// One update for every push; or one of the whole map after the last, which is as good for those who have the ones before.
+/// Applies everything that was pushed, and publishes an update for each push. If there is a new subscriber or a whole map, it publishes one
+/// update with the whole map instead, which serves the older subscribers as well.
 void MapPublisher::apply_and_tell(const std::deque<PushedChanges>& queue) {
   const bool whole = at_once_[kUpdate] || (!queue.empty() && queue.front().since == 0);
   Eigen::AlignedBox3f touched;
@@ -203,7 +205,7 @@ void MapPublisher::apply_and_tell(const std::deque<PushedChanges>& queue) {
     Eigen::AlignedBox3f box;
     if (!apply(pushed, box)) return;
     touched.extend(box);
-    if (!whole) publish(kUpdate, [&] { return with_header(messages::to_message(pushed.changes, pushed.since, box)); });
+    if (!whole) publish(kUpdate, [&] { return with_header(messages::to_message(pushed.changes, pushed.since, box, confident_)); });
   }
   if (!whole || map_.sequence() == 0) return;
   at_once_[kUpdate] = false;
@@ -211,18 +213,18 @@ void MapPublisher::apply_and_tell(const std::deque<PushedChanges>& queue) {
     for (const Surfel& slot : map_.slots())
       if (exists(slot)) touched.extend(slot.position);
     SurfelUpdate message = messages::to_message(Changes{map_.sequence(), {}, {}}, 0, touched);
-    message.surfels = messages::to_cloud(map_);
+    message.surfels = messages::to_cloud(map_, confident_);
     return with_header(std::move(message));
   });
 }
 
-/// @return false if that failed: the next push will be a whole map
+/// @return false if it failed; the next push will then be the whole map
 bool MapPublisher::apply(const PushedChanges& pushed, Eigen::AlignedBox3f& box) {
   const bool is_first = map_.sequence() == 0;
   try {
     box = map_.apply(pushed.changes, pushed.since, [this](const Surfel& surfel, bool comes) { markers_.touch(surfel, comes); });
   } catch (const std::exception& fault) {
-    ROS_WARN_THROTTLE(5, "The map's copy for publishing is made anew, because its changes could not be applied: %s", fault.what());
+    ROS_WARN_THROTTLE(5, "The copy of the map that is published is built again, because changes could not be applied: %s", fault.what());
     start_over();
     return false;
   }
@@ -248,20 +250,20 @@ void MapPublisher::publish_what_is_due() {
   bool published = false;
   for (const Topic topic : {kSurfels, kOccupied, kFrontier, kMarkers}) {
     if (stopping_) return;
-    const bool anew = at_once_[topic] && (topic == kMarkers || is_stale(topic));  // roscpp has latched the clouds, not the markers
+    const bool anew = at_once_[topic] && (topic == kMarkers || is_stale(topic));  // roscpp latches the clouds, but not the markers
     if (anew || (due && is_stale(topic))) {
       topic == kMarkers ? publish_markers() : publish_cloud(topic);
       published = true;
     }
     at_once_[topic] = false;
   }
-  // Counted from the end, so that a slow machine has time for other things, and the longer the larger the map is; who has just come does
-  // not delay the others.
+  // The pause begins after publishing, so that a slow machine has time for other things, and it is longer for larger maps. Publishing for
+  // new subscribers alone does not delay the others.
   const std::chrono::duration<double> rest((cpu_time() - cpu_before) / kShare);
   if (due && published) next_time_ = Clock::now() + std::max(period_, std::chrono::duration_cast<Clock::duration>(rest));
 }
 
-/// Publishes what `make` returns; a message that cannot be made is left out.
+/// Publishes the message that `make` returns. A message that cannot be made is left out, with a warning.
 template <typename Make>
 void MapPublisher::publish(Topic topic, Make make) {
   if (!is_heard(topic)) return;
@@ -282,7 +284,7 @@ void MapPublisher::publish_cloud(Topic topic) {
     const std::optional<Label> label = topic == kOccupied   ? std::make_optional(Label::kOccupied)
                                        : topic == kFrontier ? std::make_optional(Label::kFrontier)
                                                             : std::nullopt;
-    return with_header(messages::to_cloud(map_, label));
+    return with_header(messages::to_cloud(map_, confident_, label));
   });
 }
 

@@ -1,4 +1,4 @@
-/// Publishes the map, off the frames' path, and only what somebody listens to.
+/// Publishes the map on a thread of its own. Topics without subscribers cost nothing.
 #pragma once
 
 #include <frontier_surfels/SurfelUpdate.h>
@@ -24,51 +24,52 @@
 
 namespace frontier_surfels {
 
-/// What is known of the map besides its surfels.
+/// What is published of the map besides its surfels.
 struct MapState {
   ros::Time stamp;    ///< of the last frame
   CameraView camera;  ///< of the last frame, for ~markers
 };
 
-/// Changes on their way to the publisher's thread.
+/// Changes that wait for the publisher's thread.
 struct PushedChanges {
   Changes changes;
   std::uint64_t since = 0;
   MapState state;
 };
 
-/// Adds to the queue; neighbours in it are merged where more than `most` would wait.
+/// Adds changes to the queue. If more than `most` would wait then, two that follow each other are merged.
 void enqueue(std::deque<PushedChanges>& queue, PushedChanges pushed, std::size_t most);
 
-/// ~surfels, ~occupied, ~frontier (latched), ~update and ~markers. A thread of its own keeps a copy of the map from the changes it is given
-/// and publishes from that. Nobody listens: no changes are asked for, and nothing is done. It falls behind: no changes are asked for until
-/// it has caught up, so that it gets fewer and larger ones.
+/// Publishes ~surfels, ~occupied, ~frontier (latched), ~update and ~markers. Its thread keeps a copy of the map, which it updates from the
+/// changes that are pushed, and publishes from this copy. Without subscribers it wants no changes. If it falls behind, it wants no changes
+/// until it has caught up, and then gets all of them at once.
 class MapPublisher {
  public:
-  /// @param wake  called (from any thread) when changes would be welcome though no frame comes: somebody has begun to listen, or
-  ///              wants_changes() was false for a while
+  /// @param wake  called from any thread when changes are wanted and no frame may come: there is a new subscriber, or changes were not
+  ///              wanted for a while
   MapPublisher(ros::NodeHandle pnh, const NodeConfig& config, std::function<void()> wake);
-  ~MapPublisher();  ///< within the time of one message
+  ~MapPublisher();  ///< returns after the message that is being made
 
-  /// Whether to call push() now. To be asked after every frame, reset and load, and when woken: with somebody listening to ~update it is
-  /// mostly true, for clouds and markers only where they are due.
+  /// Whether push() should be called now. Ask after every frame, reset and load, and after every `wake`. While ~update has subscribers the
+  /// answer is mostly true; for clouds and markers it is true only when they are due.
   bool wants_changes();
 
-  /// Number of the map that has been pushed last: the next push() must contain the changes since then.
+  /// Sequence number of the map that was pushed last. The next push() must contain the changes since then.
   std::uint64_t sequence() const { return pushed_; }
 
-  /// Hands over the changes since `since`, which is sequence(), or 0: the whole map. Returns at once; what must wait is queued.
+  /// Queues the changes since the number `since`, and returns at once.
+  /// @param since  sequence(), or 0 if the changes contain the whole map
   void push(Changes changes, std::uint64_t since, const MapState& state);
 
  private:
-  using Clock = std::chrono::steady_clock;  // a bag's time may stand still
+  using Clock = std::chrono::steady_clock;  // not ROS time, which stands still while a bag is paused
   enum Topic { kSurfels, kOccupied, kFrontier, kUpdate, kMarkers, kTopics };
 
   bool is_heard(Topic topic) const;
   bool is_welcome() const;
   void on_connect(Topic topic);
 
-  // On the thread
+  // On the publisher's thread
   void run();
   std::deque<PushedChanges> wait();
   void ask_again();
@@ -87,31 +88,32 @@ class MapPublisher {
   SurfelUpdate with_header(SurfelUpdate update) const;
 
   const std::string world_frame_;
+  const Label confident_;  ///< has confidence 1 in clouds
   const Clock::duration period_;
   const std::function<void()> wake_;
   std::array<ros::Publisher, kTopics> publishers_;
-  std::array<std::atomic<int>, kTopics> listeners_within_ = {};  ///< of this process
+  std::array<std::atomic<int>, kTopics> listeners_within_ = {};  ///< number of subscribers in this process
   std::atomic<std::uint64_t> pushed_{0};
   std::atomic<bool> stopping_{false};
   std::atomic<int> thread_id_{0};
-  std::atomic<Clock::time_point> next_time_{Clock::time_point()};  ///< of clouds and markers
+  std::atomic<Clock::time_point> next_time_{Clock::time_point()};  ///< when clouds and markers are due
 
-  std::mutex mutex_;  ///< guards queue_ to connected_; held for moments only, as push() waits for it
+  std::mutex mutex_;  ///< guards queue_ to connected_; must be held for moments only, because push() waits for it
   std::condition_variable changed_;
   std::deque<PushedChanges> queue_;
-  std::size_t taken_ = 0;                     ///< from the queue, and not done with
-  bool refused_ = false;                      ///< wants_changes() was false though somebody listens
-  std::array<bool, kTopics> connected_ = {};  ///< by somebody new
+  std::size_t taken_ = 0;                     ///< number of changes that the thread is working on
+  bool refused_ = false;                      ///< wants_changes() was false although there are subscribers
+  std::array<bool, kTopics> connected_ = {};  ///< there is a new subscriber
 
-  // The thread's own
+  // Only used by the thread
   SurfelMirror map_;
   SurfelMarkers markers_;
   MapState state_;
-  std::uint64_t pushes_ = 0;                      ///< that have been applied
-  std::uint64_t version_ = 0;                     ///< counts those that have changed something
-  std::array<std::uint64_t, kTopics> sent_ = {};  ///< version_, or for markers pushes_, that has been published last
-  std::array<bool, kTopics> at_once_ = {};        ///< somebody new has not been served yet
-  bool asks_again_ = false;                       ///< calls wake_ as soon as changes are welcome
+  std::uint64_t pushes_ = 0;                      ///< number of pushes that have been applied
+  std::uint64_t version_ = 0;                     ///< number of these that have changed something
+  std::array<std::uint64_t, kTopics> sent_ = {};  ///< version_ (for markers: pushes_) that was published last
+  std::array<bool, kTopics> at_once_ = {};        ///< a new subscriber has got nothing yet
+  bool asks_again_ = false;                       ///< wake_ is to be called as soon as changes are wanted again
 
   std::thread thread_;
 };

@@ -9,8 +9,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr auto kWindow = std::chrono::seconds(5);   // for the rate
-constexpr auto kBetween = std::chrono::seconds(5);  // two warnings of one kind
+constexpr auto kWindow = std::chrono::seconds(5);   // over which the rate is measured
+constexpr auto kBetween = std::chrono::seconds(5);  // shortest time between two warnings with the same result
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -26,7 +26,7 @@ const char* result_name(std::uint8_t result) {
     case FrameReport::INTEGRATED:
       return "integrated";
     case FrameReport::DROPPED_QUEUE:
-      return "dropped: a newer one came first";
+      return "dropped: the mapper was busy";
     case FrameReport::DROPPED_PAUSED:
       return "dropped: paused";
     case FrameReport::DROPPED_NO_POSE:
@@ -46,7 +46,7 @@ MapperDiagnostics::MapperDiagnostics(const ros::NodeHandle& nh, const ros::NodeH
     : device_(std::move(device)), depth_topic_(std::move(depth_topic)), updater_(nh, pnh, pnh.getNamespace()) {
   updater_.setHardwareID(device_);
   updater_.add("mapping", this, &MapperDiagnostics::fill);
-  // Wall time: under /clock nothing would be said while a bag is paused.
+  // Wall time, because ROS time stands still while a bag is paused.
   timer_ = ros::NodeHandle(nh).createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
 }
 
@@ -60,7 +60,7 @@ void MapperDiagnostics::add(const FrameReport& report) {
     while (now - mapped_.front().first > kWindow) mapped_.pop_front();
   } else if (report.result != FrameReport::DROPPED_PAUSED) {
     last_reason_ = report.reason;
-    // A camera faster than the mapper is nothing to warn of.
+    // That the camera is faster than the mapper needs no warning.
     if (report.result != FrameReport::DROPPED_QUEUE) warn(report);
   }
 }

@@ -1,4 +1,4 @@
-/// What `/diagnostics` says of the mapper.
+/// The mapper's part of `/diagnostics`.
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
@@ -15,18 +15,18 @@
 
 namespace frontier_surfels {
 
-/// What is counted under, for people: "no pose" for DROPPED_NO_POSE.
+/// Name of a result of FrameReport, for people: "dropped: no pose" for DROPPED_NO_POSE.
 const char* result_name(std::uint8_t result);
 
-/// Counts frames by their result and publishes once a second of wall time. May be called from any thread.
+/// Counts frames by their result, and publishes once a second of wall time. All functions may be called from any thread.
 class MapperDiagnostics {
  public:
   MapperDiagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& pnh, std::string device, std::string depth_topic);
 
-  /// Counts a frame; says why it was dropped, at most every few seconds for each kind of reason.
+  /// Counts a frame. If it was dropped, warns with the reason, at most every few seconds for each result.
   void add(const FrameReport& report);
 
-  /// Size of the map and its memory.
+  /// Sets the memory of the map and on the device [byte].
   void set_memory(std::size_t map_bytes, std::size_t device_bytes);
   void set_paused(bool paused);
 
@@ -42,7 +42,7 @@ class MapperDiagnostics {
   std::array<std::uint64_t, kResults> counts_ = {};
   std::array<std::uint64_t, kResults> counts_told_ = {};
   std::array<Clock::time_point, kResults> warned_ = {};
-  std::deque<std::pair<Clock::time_point, double>> mapped_;  ///< of the last seconds: when, and total_ms
+  std::deque<std::pair<Clock::time_point, double>> mapped_;  ///< frames of the last seconds: time and total_ms
   std::size_t surfels_ = 0, map_bytes_ = 0, device_bytes_ = 0;
   bool paused_ = false;
   std::string last_reason_;

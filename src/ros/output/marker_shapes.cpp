@@ -30,7 +30,7 @@ std_msgs::ColorRGBA to_color(const Eigen::Vector3f& rgb) {
 
 bool has_color(const Surfel& surfel) { return surfel.rgb[0] != 0 || surfel.rgb[1] != 0 || surfel.rgb[2] != 0; }
 
-/// rviz does not light triangles that have colours: without shading, shapes of one colour could not be read.
+/// rviz does not light triangles that have colours of their own. Without the shading here, shapes of one colour could not be recognised.
 std_msgs::ColorRGBA color_of(const Surfel& surfel) {
   static const Eigen::Vector3f to_light = Eigen::Vector3f(0.4f, 0.3f, 0.85f).normalized();
   const float lit = 0.5f + 0.5f * surfel.normal.dot(to_light);  // 0 ... 1
@@ -39,7 +39,7 @@ std_msgs::ColorRGBA color_of(const Surfel& surfel) {
   return to_color(Eigen::Vector3f(surfel.rgb[0], surfel.rgb[1], surfel.rgb[2]) / 255);
 }
 
-/// A direction across the normal, along the axis that is most across it: so the squares of a wall lie side by side.
+/// A direction in the plane of a surfel, as near as possible to an axis of the world: squares of a wall then lie side by side.
 Eigen::Vector3d tangent(const Eigen::Vector3d& normal) {
   int axis;
   normal.cwiseAbs().minCoeff(&axis);
@@ -87,7 +87,7 @@ Marker marker(const std_msgs::Header& header, const std::string& ns, int id, int
   marker.action = Marker::ADD;
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = 1;
-  marker.color.r = marker.color.g = marker.color.b = marker.color.a = 1;  // its alpha holds for colours of points as well
+  marker.color.r = marker.color.g = marker.color.b = marker.color.a = 1;  // alpha also applies to the colours of points
   return marker;
 }
 

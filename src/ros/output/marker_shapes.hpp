@@ -1,4 +1,4 @@
-/// The shapes that ~markers is made of.
+/// The shapes in ~markers.
 #pragma once
 
 #include <std_msgs/Header.h>
@@ -17,17 +17,17 @@ namespace frontier_surfels {
 struct CameraView {
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
   Intrinsics intrinsics;
-  double z_max = 0;  ///< [m]; 0: there is no camera
+  double z_max = 0;  ///< [m]; 0 if there is no camera
 
   bool known() const { return z_max > 0 && T_world_camera.matrix().allFinite() && intrinsics.fx > 0 && intrinsics.fy > 0; }
 };
 
-/// Surfels of one label that are shown as one square: their means.
+/// Surfels of one label that are shown as one square.
 class MergedSurfels {
  public:
   void add(const Surfel& surfel);
 
-  /// @param half_side  the square's at least [m]; the mean radius where that is larger
+  /// The mean of all surfels that were added. Its radius is their mean radius, but at least `half_side` [m].
   Surfel mean(double half_side) const;
 
  private:
@@ -37,25 +37,25 @@ class MergedSurfels {
   Surfel first_;
 };
 
-/// The triangles of squares, surfels' or merged ones'.
+/// The triangles of the squares that show surfels.
 struct MarkerSquares {
   std::vector<geometry_msgs::Point> points;
   std::vector<std_msgs::ColorRGBA> colors;
 
-  /// A square of half side `radius` in the surfel's plane, its edges as level as can be. Occupied: in its colour, or shaded by its normal
-  /// where it has none; frontier: blue, shaded a little.
+  /// Adds a square in the surfel's plane. Its edges are 2 * radius long and as level as possible. Occupied surfels have their own colour,
+  /// or a grey that depends on the normal if no colour was seen; frontier surfels are blue, slightly shaded.
   void add(const Surfel& surfel);
 };
 
-/// A marker that stays until it is replaced or deleted, at the origin of the header's frame.
+/// A marker at the origin of the header's frame. It stays until it is replaced or deleted.
 visualization_msgs::Marker marker(const std_msgs::Header& header, const std::string& ns, int id, int type);
 visualization_msgs::Marker deletion(const std_msgs::Header& header, const std::string& ns, int id);
 visualization_msgs::Marker deletion_of_all(const std_msgs::Header& header);
 
-/// The camera's view as lines, up to a depth that does not hide the scene.
+/// The camera's view as the edges of a pyramid, short enough not to hide the scene.
 visualization_msgs::Marker view_pyramid(const std_msgs::Header& header, const CameraView& camera);
 
-/// How many surfels there are, above the camera, or at the origin.
+/// A text with the numbers of surfels, above the camera, or above the origin if there is no camera.
 visualization_msgs::Marker counts_text(const std_msgs::Header& header, const CameraView* camera, std::size_t occupied,
                                        std::size_t frontier);
 

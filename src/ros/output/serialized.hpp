@@ -1,8 +1,8 @@
-/// Large messages without holding up the process.
+/// Large messages that are published without holding up other threads.
 ///
-/// roscpp serialises in publish(), under a lock that every publisher of the process needs: a thread with a report of 1 kB waits for another
-/// one's cloud of 80 MB. A Serialized is published in no time; it fits every topic. Subscribers of the same process get a copy, though:
-/// for them a shared pointer is better.
+/// roscpp serialises messages in publish(), with a lock that every publisher of the process needs: a report of 1 kB then waits for a cloud
+/// of 80 MB of another thread. A Serialized message is serialised before, fits every topic, and is published at once. Subscribers in the
+/// same process get a copy of it; for them a shared pointer to the message is better.
 #pragma once
 
 #include <ros/message_traits.h>

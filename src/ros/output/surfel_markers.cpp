@@ -6,19 +6,19 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr double kCellsPerMetre = 256;           // a block of 2^7 cells is 0.5 m wide
-constexpr std::uint32_t kLatticeSize = 1 << 24;  // 65 km; what lies beyond is counted to its outermost cells
-constexpr std::uint32_t kOrigin = 0x555555;      // the world's origin in the lattice: far from the corners of blocks of every size
+constexpr double kCellsPerMetre = 256;           // so that a block of 2^7 cells is 0.5 m wide
+constexpr std::uint32_t kLatticeSize = 1 << 24;  // 65 km; surfels outside of it belong to its outermost cells
+constexpr std::uint32_t kOrigin = 0x555555;      // cell of the world's origin: far from the corners of blocks of every size
 constexpr char const* kNamespaces[] = {"frontier", "occupied"};
 
 int namespace_of(Label label) { return label == Label::kOccupied ? 1 : 0; }
 
 std::uint64_t lattice(float metres) {
   const double cell = metres * kCellsPerMetre + kOrigin;
-  return cell > 0 ? static_cast<std::uint64_t>(std::min<double>(cell, kLatticeSize - 1)) : 0;  // 0 for NaN, too
+  return cell > 0 ? static_cast<std::uint64_t>(std::min<double>(cell, kLatticeSize - 1)) : 0;  // also 0 for NaN
 }
 
-/// Puts two zeros between the lowest 21 bits.
+/// Puts two zeros between every two of the lowest 21 bits.
 std::uint64_t spread(std::uint64_t bits) {
   bits = (bits | bits << 32) & 0x001f00000000ffff;
   bits = (bits | bits << 16) & 0x001f0000ff0000ff;
@@ -27,7 +27,7 @@ std::uint64_t spread(std::uint64_t bits) {
   return (bits | bits << 2) & 0x1249249249249249;
 }
 
-/// 0 ... 5: the axis that the normal is nearest to, and its sign.
+/// The direction that is nearest to the normal: twice the axis, plus one if the normal points the other way (0 ... 5).
 std::uint64_t direction(const Eigen::Vector3f& normal) {
   int axis;
   normal.cwiseAbs().maxCoeff(&axis);
@@ -40,10 +40,10 @@ int highest_bit(std::uint64_t bits) { return 63 - __builtin_clzll(bits); }
 
 SurfelMarkers::Key SurfelMarkers::block_key(const Surfel& surfel) const {
   const Eigen::Vector3f& p = surfel.position;
-  return lattice(p.x()) >> shift_ << 40 | lattice(p.y()) >> shift_ << 20 | lattice(p.z()) >> shift_;  // 17 bits each at most
+  return lattice(p.x()) >> shift_ << 40 | lattice(p.y()) >> shift_ << 20 | lattice(p.z()) >> shift_;  // at most 17 bits each
 }
 
-/// Label, direction of the normal, and the cell within the block as a Morton number.
+/// Label, direction of the normal, and Morton number of the cell within the block.
 SurfelMarkers::Key SurfelMarkers::cell_key(const Surfel& surfel) const {
   const Eigen::Vector3f& p = surfel.position;
   const std::uint64_t within = (std::uint64_t{1} << shift_) - 1;
@@ -65,8 +65,8 @@ SurfelMarkers::Block& SurfelMarkers::touched_block(Key key) {
 void SurfelMarkers::touch(const Surfel& surfel, bool comes) {
   if (!indexed_) return;
   Block& block = touched_block(block_key(surfel));
-  if (!comes) return;                              // refresh() finds out
-  if (block.ids.size() == block.ids.capacity()) {  // many may be the same ones again: they must not pile up until the next update
+  if (!comes) return;                              // refresh() finds out that the surfel is gone
+  if (block.ids.size() == block.ids.capacity()) {  // surfels that change often must not pile up until the next update
     std::sort(block.ids.begin(), block.ids.end());
     block.ids.erase(std::unique(block.ids.begin(), block.ids.end()), block.ids.end());
     if (2 * block.ids.size() >= block.ids.capacity()) block.ids.reserve(2 * block.ids.capacity() + 1);
@@ -90,7 +90,7 @@ void SurfelMarkers::index(const std::vector<Surfel>& slots) {
   indexed_ = true;
 }
 
-/// Leaves the surfels that are there, ordered by cell, and counts the squares on every level.
+/// Orders the surfels of a block by cell, removes those that are gone, and counts the squares on every level.
 void SurfelMarkers::refresh(Key key, Block& block, const std::vector<Surfel>& slots) {
   scratch_.clear();
   for (const std::uint32_t id : block.ids)
@@ -102,7 +102,7 @@ void SurfelMarkers::refresh(Key key, Block& block, const std::vector<Surfel>& sl
   block.begins.resize(scratch_.size());
   block.squares.fill(0);
   for (std::size_t i = 0; i < scratch_.size(); ++i) {
-    // Cubes of level n >= 1 are the keys without their last 3 (n - 1) bits.
+    // The cube on level n >= 1 is the key without its last 3 (n - 1) bits.
     const Key difference = i == 0 ? ~Key{0} : scratch_[i].first ^ scratch_[i - 1].first;
     const int level = difference == 0 ? 0 : std::min(highest_bit(difference) / 3 + 1, kLevels - 1);
     block.ids[i] = scratch_[i].second;
@@ -119,15 +119,16 @@ std::size_t SurfelMarkers::total(int level) const {
   return total;
 }
 
-/// The finest level that fits the limit. A finer one than now must fit with room to spare: each change sends everything again.
+/// The finest level that keeps the limit. A level finer than the present one must leave room to spare, because everything is sent again
+/// when the level changes.
 int SurfelMarkers::fitting_level() const {
-  const int coarsest = shift_ + 1;  // that blocks of this size know of
+  const int coarsest = shift_ + 1;  // of blocks of this size
   for (int level = 0; level <= coarsest; ++level)
     if (total(level) <= (level < level_ ? limit_ / 4 * 3 : limit_)) return level;
   return std::min(coarsest + 1, kLevels - 1);
 }
 
-/// @return whether the level has changed
+/// Brings all touched blocks up to date and chooses the level. @return whether the level has changed
 bool SurfelMarkers::settle_level(const std::vector<Surfel>& slots) {
   for (bool changed = false;; changed = true) {
     for (const Key key : touched_) {

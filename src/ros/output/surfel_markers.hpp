@@ -1,4 +1,4 @@
-/// The map as markers for rviz: oriented squares of the surfels' radius, a marker a block, bounded in number.
+/// The map as markers for rviz: oriented squares, one marker for each block and label, of a limited number in all.
 #pragma once
 
 #include <ros/time.h>
@@ -17,44 +17,46 @@
 
 namespace frontier_surfels {
 
-/// Makes the messages; keeps track of which blocks have markers out there. No publisher in it.
+/// Makes the messages, and keeps track of which blocks have markers that are shown. It publishes nothing itself.
 ///
-/// Blocks are cubes of 0.5 m with at most two markers each, in namespaces "occupied" and "frontier". Where there are more surfels than the
-/// limit, those of a small cube, one label and one of six directions are merged to one square, and the cubes' size is doubled until it
-/// fits. Cubes are made of cells of a lattice, and a surfel's cell is a Morton number, so that every size of cube is a prefix of it: how
-/// many squares there would be is counted for all sizes at once.
+/// Blocks are cubes of 0.5 m with at most two markers each, in the namespaces "occupied" and "frontier". If there are more surfels than the
+/// limit, all surfels in a small cube that have the same label and nearly the same direction (one of six) are merged to one square. The
+/// size of these cubes is doubled until the squares are few enough. Cubes consist of cells of a lattice, and the number of a surfel's cell
+/// is a Morton number, so that a prefix of it is the number of a larger cube. The squares of all sizes are thus counted at once.
 class SurfelMarkers {
  public:
-  /// @param limit  squares in all blocks together
+  /// @param limit  maximum number of squares in all blocks together
   SurfelMarkers(std::string world_frame, std::size_t limit) : world_frame_(std::move(world_frame)), limit_(limit) {}
 
-  /// A surfel comes or goes: its block must be sent again. For SurfelMirror::apply; does nothing before the first update().
+  /// A surfel comes or goes, so that its block must be sent again. To be given to SurfelMirror::apply. Does nothing before the first
+  /// update().
   void touch(const Surfel& surfel, bool comes);
 
-  /// Nobody looks: gives all memory back. The next update() is one of everything.
+  /// Frees all memory, because there are no subscribers. The next update() contains everything.
   void forget();
 
-  /// The markers of all blocks that have been touched since the last update, deletions of those that have become empty, the view pyramid
-  /// (namespace "camera") and a text with the counts ("counts"). `all`, and the first time: everything, after a DELETEALL.
+  /// The markers of all blocks that have been touched since the last update, deletions of blocks that have become empty, the view pyramid
+  /// (namespace "camera") and a text with the numbers of surfels ("counts").
+  /// @param all  the message begins with a DELETEALL and contains all blocks, as the first one always does
   visualization_msgs::MarkerArray update(const SurfelMirror& map, const std::optional<CameraView>& camera, const ros::Time& stamp,
                                          bool all);
 
-  std::size_t squares() const;  ///< out there, after update()
-  double cell() const;          ///< edge of the cubes that are merged [m]; 0: all surfels are shown
+  std::size_t squares() const;  ///< number of squares that are shown after update()
+  double cell() const;          ///< edge of the cubes in which surfels are merged [m]; 0 if every surfel is shown
 
  private:
-  static constexpr int kBlockShift = 7;  ///< a block is 2^7 cells wide, and wider only where a cube would not fit in
+  static constexpr int kBlockShift = 7;  ///< a block is 2^7 cells wide, unless the cubes are larger
   static constexpr int kMostShift = 20;
-  static constexpr int kLevels = kMostShift + 2;  ///< 0: surfels; n: cubes of 2^(n - 1) cells
+  static constexpr int kLevels = kMostShift + 2;  ///< level 0: every surfel; level n: cubes 2^(n - 1) cells wide
 
   using Key = std::uint64_t;
   struct Block {
     int number = 0;                                ///< id of its markers
-    bool touched = false;                          ///< ids and squares are to be brought up to date
-    std::array<bool, 2> shown = {};                ///< by label: whether there is a marker out there
-    std::vector<std::uint32_t> ids;                ///< of its surfels, by cell; while touched: of more, and in any order
-    std::vector<std::uint8_t> begins;              ///< for each of them the last level on which it begins a new square
-    std::array<std::uint32_t, kLevels> squares{};  ///< on every level
+    bool touched = false;                          ///< ids and squares must be brought up to date
+    std::array<bool, 2> shown = {};                ///< whether a marker is shown, for each label
+    std::vector<std::uint32_t> ids;                ///< its surfels, ordered by cell; while touched, unordered and with surfels too many
+    std::vector<std::uint8_t> begins;              ///< for each surfel the coarsest level on which it begins a new square
+    std::array<std::uint32_t, kLevels> squares{};  ///< number of squares on each level
   };
 
   Key block_key(const Surfel& surfel) const;
@@ -72,7 +74,7 @@ class SurfelMarkers {
   std::size_t limit_;
   bool indexed_ = false;
   int level_ = 0;
-  int shift_ = kBlockShift;  ///< of the blocks
+  int shift_ = kBlockShift;  ///< blocks are 2^shift_ cells wide
   int next_number_ = 0;
   bool camera_shown_ = false;
   std::unordered_map<Key, Block> blocks_;

@@ -17,41 +17,56 @@ using sensor_msgs::PointField;
 
 constexpr bool kThisMachineIsBigEndian = BOOST_ENDIAN_BIG_BYTE;
 
-/// A surfel as it lies in a cloud.
+/// A surfel in a cloud: pcl::PointSurfel with id and label in its gaps.
 struct Point {
-  float position[3], normal[3], radius;
-  std::uint32_t rgb;  // 0x00rrggbb, PCL's packing
+  float position[3];
   std::uint32_t id;
-  std::uint8_t label, padding[3];
+  float normal[3];
+  std::uint32_t label;
+  std::uint32_t rgb;
+  float radius, confidence, curvature;
 };
-static_assert(sizeof(Point) == 40, "points are copied as they lie in memory");
+static_assert(sizeof(Point) == kBytesOfSurfel, "points are copied as they lie in memory");
+
+/// In the highest byte of Point::rgb: no colour was seen, and the one that is there is only for show.
+constexpr std::uint32_t kNotSeen = 1U << 24;
+constexpr std::uint32_t kBlue = 0x0000ff, kGrey = 0x808080;
 
 struct Field {
   const char* name;
   std::uint8_t type;
   std::size_t offset;  ///< [byte] in Point
 };
-constexpr std::array<Field, 10> kFields = {{{"x", PointField::FLOAT32, offsetof(Point, position)},
+constexpr std::size_t kFieldBytes = 4;     // of every field
+constexpr std::size_t kSurfelFields = 10;  // the first of kFields, which are needed to read a cloud
+constexpr std::array<Field, 12> kFields = {{{"x", PointField::FLOAT32, offsetof(Point, position)},
                                             {"y", PointField::FLOAT32, offsetof(Point, position) + 4},
                                             {"z", PointField::FLOAT32, offsetof(Point, position) + 8},
+                                            {"id", PointField::UINT32, offsetof(Point, id)},
                                             {"normal_x", PointField::FLOAT32, offsetof(Point, normal)},
                                             {"normal_y", PointField::FLOAT32, offsetof(Point, normal) + 4},
                                             {"normal_z", PointField::FLOAT32, offsetof(Point, normal) + 8},
-                                            {"radius", PointField::FLOAT32, offsetof(Point, radius)},
+                                            {"label", PointField::UINT32, offsetof(Point, label)},
                                             {"rgb", PointField::FLOAT32, offsetof(Point, rgb)},
-                                            {"id", PointField::UINT32, offsetof(Point, id)},
-                                            {"label", PointField::UINT8, offsetof(Point, label)}}};
+                                            {"radius", PointField::FLOAT32, offsetof(Point, radius)},
+                                            {"confidence", PointField::FLOAT32, offsetof(Point, confidence)},
+                                            {"curvature", PointField::FLOAT32, offsetof(Point, curvature)}}};
 
-std::size_t bytes_of(const Field& field) { return field.type == PointField::UINT8 ? 1 : 4; }
+std::uint32_t shown_color(const Surfel& s) {
+  const std::uint32_t seen = static_cast<std::uint32_t>(s.rgb[0] << 16 | s.rgb[1] << 8 | s.rgb[2]);
+  if (seen != 0) return seen;
+  return kNotSeen | (s.label == Label::kFrontier ? kBlue : kGrey);
+}
 
-Point to_point(const Surfel& s) {
+Point to_point(const Surfel& s, Label confident) {
   Point point = {};
   std::memcpy(point.position, s.position.data(), sizeof(point.position));
   std::memcpy(point.normal, s.normal.data(), sizeof(point.normal));
-  point.radius = s.radius;
-  point.rgb = static_cast<std::uint32_t>(s.rgb[0] << 16 | s.rgb[1] << 8 | s.rgb[2]);
   point.id = s.id;
-  point.label = static_cast<std::uint8_t>(s.label);
+  point.label = static_cast<std::uint32_t>(s.label);
+  point.rgb = shown_color(s);
+  point.radius = s.radius;
+  point.confidence = s.label == confident ? 1 : 0;
   return point;
 }
 
@@ -61,15 +76,16 @@ Surfel to_surfel(const Point& point) {
   std::memcpy(s.position.data(), point.position, sizeof(point.position));
   std::memcpy(s.normal.data(), point.normal, sizeof(point.normal));
   s.radius = point.radius;
-  for (int channel = 0; channel < 3; ++channel) s.rgb[channel] = static_cast<std::uint8_t>(point.rgb >> (16 - 8 * channel));
+  const std::uint32_t rgb = point.rgb >> 24 == kNotSeen >> 24 ? 0 : point.rgb;
+  for (int channel = 0; channel < 3; ++channel) s.rgb[channel] = static_cast<std::uint8_t>(rgb >> (16 - 8 * channel));
   s.id = point.id;
   s.label = static_cast<Label>(point.label);
   return s;
 }
 
-/// The cloud of those of `surfels` that `wanted` picks, of which there are `count`.
+/// A cloud of the surfels that `wanted` picks. @param count  number of them
 template <typename Wanted>
-PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Wanted wanted) {
+PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Label confident, Wanted wanted) {
   if (count > kMostSurfels)
     throw Error(std::to_string(count) + " surfels are more than a PointCloud2 can hold: map with a larger decimation, or reset.");
   PointCloud2 cloud;
@@ -87,7 +103,7 @@ PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Wanted w
   cloud.is_bigendian = kThisMachineIsBigEndian;
   cloud.is_dense = true;
 
-  // Appended by the thousand: to resize first would write every page twice.
+  // Surfels are appended by the thousand. Resizing `data` first would write every page of memory twice.
   cloud.data.reserve(cloud.row_step);
   std::array<Point, 1024> points;
   std::size_t filled = 0;
@@ -98,7 +114,7 @@ PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Wanted w
   };
   for (const Surfel& surfel : surfels) {
     if (!wanted(surfel)) continue;
-    points[filled++] = to_point(surfel);
+    points[filled++] = to_point(surfel, confident);
     if (filled == points.size()) flush();
   }
   flush();
@@ -109,14 +125,14 @@ std::size_t find_offset(const PointCloud2& cloud, const Field& field) {
   const std::string name = field.name;
   const auto found = std::find_if(cloud.fields.begin(), cloud.fields.end(), [&](const PointField& f) { return f.name == name; });
   if (found == cloud.fields.end()) throw Error("The cloud has no field " + name + ": give one of a mapper's.");
-  if (found->datatype != field.type || found->count > 1)  // some write 0 for 1
+  if (found->datatype != field.type || found->count > 1)  // some programs write 0 instead of 1
     throw Error("The cloud's field " + name + " is not of the type that a mapper gives it: give one of a mapper's.");
-  if (std::uint64_t{found->offset} + bytes_of(field) > cloud.point_step)
+  if (std::uint64_t{found->offset} + kFieldBytes > cloud.point_step)
     throw Error("The cloud is damaged: its field " + name + " lies outside of the point.");
   return found->offset;
 }
 
-/// In 64 bits: damaged sizes overflow 32.
+/// Computes in 64 bits, because damaged sizes overflow 32.
 void check_size(const PointCloud2& cloud) {
   if (static_cast<bool>(cloud.is_bigendian) != kThisMachineIsBigEndian)
     throw Error("The cloud comes from a machine of another byte order: run both programs on machines of the same.");
@@ -142,19 +158,19 @@ std::uint32_t count32(std::size_t count) {
 
 }  // namespace
 
-PointCloud2 to_cloud(const std::vector<Surfel>& surfels) {
-  return pack(surfels, surfels.size(), [](const Surfel&) { return true; });
+PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident) {
+  return pack(surfels, surfels.size(), confident, [](const Surfel&) { return true; });
 }
 
-PointCloud2 to_cloud(const SurfelMirror& map, std::optional<Label> only) {
-  if (!only) return pack(map.slots(), map.size(), exists);
+PointCloud2 to_cloud(const SurfelMirror& map, Label confident, std::optional<Label> only) {
+  if (!only) return pack(map.slots(), map.size(), confident, exists);
   const std::size_t count = *only == Label::kOccupied ? map.occupied() : map.size() - map.occupied();
-  return pack(map.slots(), count, [label = *only](const Surfel& s) { return exists(s) && s.label == label; });
+  return pack(map.slots(), count, confident, [label = *only](const Surfel& s) { return exists(s) && s.label == label; });
 }
 
 std::vector<Surfel> to_surfels(const PointCloud2& cloud) {
-  std::array<std::size_t, kFields.size()> offsets;
-  for (std::size_t i = 0; i < kFields.size(); ++i) offsets[i] = find_offset(cloud, kFields[i]);
+  std::array<std::size_t, kSurfelFields> offsets;
+  for (std::size_t i = 0; i < offsets.size(); ++i) offsets[i] = find_offset(cloud, kFields[i]);
   check_size(cloud);
 
   std::vector<Surfel> surfels;
@@ -163,19 +179,19 @@ std::vector<Surfel> to_surfels(const PointCloud2& cloud) {
     for (std::size_t column = 0; column < cloud.width; ++column) {
       const std::uint8_t* data = &cloud.data[row * cloud.row_step + column * cloud.point_step];
       Point point;
-      for (std::size_t i = 0; i < kFields.size(); ++i)
-        std::memcpy(reinterpret_cast<std::uint8_t*>(&point) + kFields[i].offset, data + offsets[i], bytes_of(kFields[i]));
+      for (std::size_t i = 0; i < offsets.size(); ++i)
+        std::memcpy(reinterpret_cast<std::uint8_t*>(&point) + kFields[i].offset, data + offsets[i], kFieldBytes);
       surfels.push_back(to_surfel(point));
     }
   }
   return surfels;
 }
 
-SurfelUpdate to_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box) {
+SurfelUpdate to_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box, Label confident) {
   SurfelUpdate message;
   message.sequence = changes.sequence;
   message.since = since;
-  message.surfels = to_cloud(changes.updated);
+  message.surfels = to_cloud(changes.updated, confident);
   message.removed = changes.removed;
   message.box_min = to_message(box.min());
   message.box_max = to_message(box.max());

@@ -14,21 +14,27 @@
 
 namespace frontier_surfels::messages {
 
-/// Fields x y z normal_x normal_y normal_z radius (float32), rgb (float32, PCL's packing; 0: no colour was seen), id (uint32),
-/// label (uint8; 1 occupied, 0 frontier); 40 bytes a point. Everything of a surfel is in it, bit for bit. The header is left empty.
+/// A cloud of surfels in the layout of pcl::PointSurfel, 48 bytes a point. All fields are float32, except id and label, which are uint32:
+///   x 0, y 4, z 8, id 12, normal_x 16, normal_y 20, normal_z 24, label 28, rgb 32, radius 36, confidence 40, curvature 44
+/// label is 1 for occupied and 0 for frontier; curvature is 0. rgb is PCL's packing. A surfel without a colour is shown blue if it is
+/// frontier and grey if it is occupied, and the highest byte of its rgb is 1 instead of 0. to_surfels() thus gives back every surfel bit
+/// for bit. The header is left empty.
+/// @param confident  surfels of this label have confidence 1, all others 0
 /// @throws Error if there are more surfels than a cloud can hold
-sensor_msgs::PointCloud2 to_cloud(const std::vector<Surfel>& surfels);
+sensor_msgs::PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident = Label::kFrontier);
 
-/// The same of a whole map, or of one label, ordered by id; makes no copy in between.
-sensor_msgs::PointCloud2 to_cloud(const SurfelMirror& map, std::optional<Label> only = std::nullopt);
+/// The same for a whole map or the surfels of one label, ordered by id. The surfels are not copied in between.
+sensor_msgs::PointCloud2 to_cloud(const SurfelMirror& map, Label confident = Label::kFrontier, std::optional<Label> only = std::nullopt);
 
-/// Back again; the fields are found by name. @throws Error if one is missing or of another type, or the data are cut short or damaged
+/// The surfels of such a cloud. Fields are found by their names; confidence and curvature need not be there.
+/// @throws Error if a field is missing or of another type, or the data are cut short or damaged
 std::vector<Surfel> to_surfels(const sensor_msgs::PointCloud2& cloud);
 
-/// What has changed since number `since`, `box` around it; the header is left empty. @throws Error as to_cloud
-frontier_surfels::SurfelUpdate to_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box);
+/// The changes of the map since sequence number `since`, with the box around them. The header is left empty. @throws Error as to_cloud
+frontier_surfels::SurfelUpdate to_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box,
+                                          Label confident = Label::kFrontier);
 
-/// counts, times and sequence of `report`; header, result, latency and wait are left to the caller.
+/// The report's sequence number, counts and times. Header, result, reason, latency and wait are left empty.
 frontier_surfels::FrameReport to_message(const Report& report);
 
 }  // namespace frontier_surfels::messages

@@ -9,7 +9,7 @@ namespace {
 
 bool by_id(const Surfel& a, const Surfel& b) { return a.id < b.id; }
 
-/// The number of slots that the changes need. @throws Error
+/// The number of slots that the changes need. @throws Error if an id is impossible
 std::size_t slots_for(const Changes& changes) {
   std::size_t slots = 0;
   for (const Surfel& surfel : changes.updated) slots = std::max(slots, std::size_t{surfel.id} + 1);
@@ -27,7 +27,7 @@ std::vector<Surfel> pick(const std::vector<Surfel>& slots, std::size_t most, Wan
   return surfels;
 }
 
-/// Ordered by id, and of several with one id the last alone.
+/// Orders surfels by id. Of several surfels with the same id, only the last one is kept.
 void order(std::vector<Surfel>& surfels) {
   if (!std::is_sorted(surfels.begin(), surfels.end(), by_id)) std::stable_sort(surfels.begin(), surfels.end(), by_id);
   const auto same = [](const Surfel& a, const Surfel& b) { return a.id == b.id; };
@@ -39,7 +39,7 @@ void order(std::vector<std::uint32_t>& ids) {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
-/// `surfels` without those whose ids are in `ids`; both ordered.
+/// The surfels whose ids are not in `ids`. Both must be ordered by id.
 std::vector<Surfel> without(const std::vector<Surfel>& surfels, const std::vector<std::uint32_t>& ids) {
   std::vector<Surfel> left;
   left.reserve(surfels.size());
@@ -106,7 +106,7 @@ Changes merge(Changes earlier, Changes later) {
   Changes merged;
   merged.sequence = later.sequence;
 
-  // set_union takes the first one's where both have an id: the later one's.
+  // If both have a surfel of one id, set_union takes the one of its first argument.
   const std::vector<Surfel> kept = without(earlier.updated, later.removed);
   merged.updated.reserve(kept.size() + later.updated.size());
   std::set_union(later.updated.begin(), later.updated.end(), kept.begin(), kept.end(), std::back_inserter(merged.updated), by_id);

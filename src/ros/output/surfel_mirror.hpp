@@ -1,4 +1,4 @@
-/// The map on the host, kept up to date by changes: what is published is taken from here, never from the device.
+/// A copy of the map that is kept up to date by the map's changes.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -10,36 +10,39 @@
 
 namespace frontier_surfels {
 
-/// As many as a PointCloud2 of 40 bytes a surfel can hold; a higher id can only be a damaged one.
-constexpr std::size_t kMostSurfels = 0xffffffffu / 40;
+/// Size of a surfel in a PointCloud2 [byte].
+constexpr std::size_t kBytesOfSurfel = 48;
+
+/// Maximum number of surfels in a PointCloud2. An id that is not below it must be damaged.
+constexpr std::size_t kMostSurfels = 0xffffffffu / kBytesOfSurfel;
 
 /// Whether there is a surfel in a slot of SurfelMirror.
 inline bool exists(const Surfel& slot) { return slot.radius != 0; }
 
-/// No ROS, no locks.
+/// Contains no ROS and no locks.
 class SurfelMirror {
  public:
-  /// Is told of every surfel that goes (false) and that comes (true); of one that changes, as it was and as it is.
+  /// Called for every surfel that goes (comes = false) and that comes (comes = true). A surfel that changes goes and comes.
   using Visit = std::function<void(const Surfel& surfel, bool comes)>;
 
-  /// Number of the map that this is; 0: empty, before any.
+  /// Sequence number of the map that this is a copy of; 0 before the first changes.
   std::uint64_t sequence() const { return sequence_; }
   std::size_t size() const { return size_; }
   std::size_t occupied() const { return occupied_; }
 
-  /// Applies what has changed since `since`, which must be sequence(), or 0: the whole map.
-  /// @return the box around the centres of all surfels added, changed (before and after) or removed; empty if there are none
-  /// @throws Error if `since` is another number or an id is impossible: nothing has changed
+  /// Applies the changes since the number `since`, which must be sequence(), or 0 if the changes contain the whole map.
+  /// @return the box around the centres of all surfels that go or come; empty if there are none
+  /// @throws Error if `since` is another number or an id is impossible; the copy is then as before
   Eigen::AlignedBox3f apply(const Changes& changes, std::uint64_t since, const Visit& visit = {});
 
   /// All surfels, ordered by id.
   std::vector<Surfel> surfels() const;
-  /// Those of one label.
+  /// The surfels of one label, ordered by id.
   std::vector<Surfel> surfels(Label label) const;
-  /// Those whose centre lies in the box.
+  /// The surfels whose centre lies in the box, ordered by id.
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
 
-  /// By id, from 0 to the highest one; radius 0: there is no surfel of this id.
+  /// Surfels by id, from 0 to the highest id. Slots without a surfel have radius 0.
   const std::vector<Surfel>& slots() const { return slots_; }
 
  private:
@@ -48,7 +51,7 @@ class SurfelMirror {
   std::vector<Surfel> slots_;
 };
 
-/// One difference instead of two that follow each other: where both name a surfel, the later one holds. Both ordered by id afterwards.
+/// Two changes that follow each other as one. If both name a surfel, the later ones count. Surfels and ids are ordered.
 Changes merge(Changes earlier, Changes later);
 
 }  // namespace frontier_surfels

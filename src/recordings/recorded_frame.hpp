@@ -1,4 +1,4 @@
-/// A depth image with all that belongs to it, from a recording or from messages.
+/// A depth image of a recording with all that belongs to it.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace frontier_surfels::replay {
 
-/// A frame that owns its images, in this machine's byte order.
+/// A frame that owns its images. They are in this machine's byte order.
 struct RecordedFrame {
   double stamp = 0;  ///< [s]
   cv::Mat depth;     ///< CV_16UC1 [mm] or CV_32FC1 [m]
@@ -16,7 +16,7 @@ struct RecordedFrame {
   Intrinsics intrinsics;
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
 
-  /// A view of this frame; valid as long as this.
+  /// A view of this frame, valid as long as the frame itself. @throws BadFrame if an image is of another type
   DepthFrame view() const;
 };
 

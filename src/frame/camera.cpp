@@ -1,0 +1,46 @@
+#include "frame/camera.hpp"
+
+#include <algorithm>
+
+namespace frontier_surfels {
+namespace {
+
+constexpr std::size_t kMostCameras = 16;  // a driver that changes its intrinsics with every frame must not fill the memory
+
+}  // namespace
+
+Camera::Camera(Commands& commands, const Intrinsics& intrinsics, const Config& config)
+    : intrinsics_(intrinsics),
+      layer_depth_(commands),
+      pixels_i_(commands),
+      pixels_j_(commands),
+      words_i_(commands),
+      depth_(commands),
+      color_(commands) {
+  const ViewGrid view = make_view_grid(intrinsics, config);
+  grid_ = view.grid;
+  layer_depth_.write(view.layer_depth);
+  pixels_i_.write(view.pixels_i);
+  pixels_j_.write(view.pixels_j);
+  words_i_.write(view.words_i);
+}
+
+void Camera::set_image(const WorkingImage& image) {
+  depth_.send(image.depth);
+  color_.send(image.color);
+  has_color_ = !image.color.empty();
+}
+
+Camera& Cameras::find(const Intrinsics& intrinsics) {
+  const auto found =
+      std::find_if(cameras_.begin(), cameras_.end(), [&](const Camera& camera) { return same_camera(camera.intrinsics(), intrinsics); });
+  if (found != cameras_.end()) {
+    cameras_.splice(cameras_.begin(), cameras_, found);
+  } else {
+    cameras_.emplace_front(commands_, intrinsics, config_);
+    if (cameras_.size() > kMostCameras) cameras_.pop_back();
+  }
+  return cameras_.front();
+}
+
+}  // namespace frontier_surfels

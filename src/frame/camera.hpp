@@ -1,0 +1,67 @@
+/// A depth camera on the device: the grid of its views with its fixed tables, and its newest image.
+#pragma once
+
+#include <list>
+
+#include "common/shared.h"
+#include "frame/view_grid.hpp"
+#include "frame/working_image.hpp"
+#include "frontier_surfels/config.hpp"
+#include "frontier_surfels/types.hpp"
+#include "opencl/commands.hpp"
+
+namespace frontier_surfels {
+
+class Camera {
+ public:
+  /// @param intrinsics  of the working image
+  /// @throws BadFrame   the grid would be too large
+  Camera(Commands& commands, const Intrinsics& intrinsics, const Config& config);
+
+  /// Sends the working image of a frame. Its intrinsics must be this camera's.
+  void set_image(const WorkingImage& image);
+
+  const Intrinsics& intrinsics() const { return intrinsics_; }
+  const Grid& grid() const { return grid_; }
+
+  /// @name Tables, fixed: see ViewGrid
+  /// @{
+  const DeviceArray<float>& layer_depth() const { return layer_depth_; }
+  const DeviceArray<PixelRange>& pixels_i() const { return pixels_i_; }
+  const DeviceArray<PixelRange>& pixels_j() const { return pixels_j_; }
+  const DeviceArray<PixelRange>& words_i() const { return words_i_; }
+  /// @}
+
+  /// @name The image, [height][width]: see WorkingImage
+  /// @{
+  const SentArray<float>& depth() const { return depth_; }
+  const SentArray<cl_uint>& color() const { return color_; }
+  bool has_color() const { return has_color_; }
+  /// @}
+
+ private:
+  Intrinsics intrinsics_;
+  Grid grid_ = {};
+  DeviceArray<float> layer_depth_;
+  DeviceArray<PixelRange> pixels_i_, pixels_j_, words_i_;
+  SentArray<float> depth_;
+  SentArray<cl_uint> color_;
+  bool has_color_ = false;
+};
+
+/// The cameras that frames have come from lately. Cameras that take turns keep their tables.
+class Cameras {
+ public:
+  Cameras(Commands& commands, const Config& config) : commands_(commands), config_(config) {}
+
+  /// The camera with these intrinsics of its working image; a new one if there is none. The reference holds until the next call.
+  /// @throws BadFrame  its grid would be too large
+  Camera& find(const Intrinsics& intrinsics);
+
+ private:
+  Commands& commands_;
+  const Config config_;
+  std::list<Camera> cameras_;  ///< the one used last comes first
+};
+
+}  // namespace frontier_surfels

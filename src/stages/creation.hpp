@@ -1,0 +1,39 @@
+/// New surfel filter and creation - paper 3.5, eq. (14)-(16); kernels/stages/13_new_surfel_filter.cl and 15_creation.cl.
+#pragma once
+
+#include "map/surfel_map.hpp"
+#include "opencl/lists.hpp"
+#include "stages/candidates.hpp"
+#include "stages/frame.hpp"
+#include "stages/new_surfels.hpp"
+
+namespace frontier_surfels {
+
+class Creation {
+ public:
+  Creation(Commands& commands, Lists& lists);
+
+  /// Chooses the candidates that make a surfel: those that are not known and have a direction. Makes room for the surfels.
+  /// @param known  K~ of the paper's section 3.2; null where the recent views have settled all
+  /// @return how many
+  std::size_t filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
+
+  /// Creates the surfels that filter() has chosen, and puts them into the map.
+  /// @param tile_views  ViewSettling::tile_views()
+  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views,
+              const CandidateList& list, SurfelMap& map);
+
+  std::size_t count() const { return count_; }
+  const DeviceArray<cl_uint>& chosen() const { return chosen_; }  ///< [count]: numbers in the list of candidates, ascending
+  const NewSurfels& new_surfels() const { return new_; }
+
+ private:
+  Commands& commands_;
+  Lists& lists_;
+  std::size_t count_ = 0;
+  BitField kept_;  ///< a bit for each listed candidate
+  DeviceArray<cl_uint> chosen_;
+  NewSurfels new_;
+};
+
+}  // namespace frontier_surfels

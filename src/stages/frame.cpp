@@ -1,0 +1,17 @@
+#include "stages/frame.hpp"
+
+namespace frontier_surfels {
+
+Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const Limits& limits) {
+  Frame frame = {};
+  frame.grid = camera.grid();
+  frame.limits = limits;
+  frame.window = window.window();
+  frame.T_camera_local = to_transform(window.T_camera_local());
+  frame.T_local_camera = to_transform(window.T_camera_local().inverse());
+  frame.own_view = views.own_view();
+  frame.has_color = camera.has_color() ? 1 : 0;
+  return frame;
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,29 @@
+/// Split of surfels that are large for this view - paper 3.4; kernels/stages/4_split.cl.
+#pragma once
+
+#include "map/surfel_map.hpp"
+#include "opencl/lists.hpp"
+#include "stages/frame.hpp"
+#include "stages/new_surfels.hpp"
+
+namespace frontier_surfels {
+
+class SurfelSplit {
+ public:
+  SurfelSplit(Commands& commands, Lists& lists);
+
+  /// Puts smaller surfels in the place of large ones. What the visit has found of the map is out of date then.
+  /// @param large  SurfelVisit::large()
+  /// @return surfels that this adds to the map
+  std::size_t split(const Frame& frame, const BitField& large, SurfelMap& map);
+
+  const NewSurfels& children() const { return children_; }
+
+ private:
+  Commands& commands_;
+  Lists& lists_;
+  DeviceArray<cl_uint> parents_, offsets_;
+  NewSurfels children_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,42 @@
+/// The pass over the map's surfels around the view; kernels/stages/3_visit.cl. It says which surfels the grid sees, which of them are too
+/// large - paper 3.4 -, which are to be removed - eq. (12) - and, in the map's marks of changes, which are to be labelled.
+#pragma once
+
+#include "map/surfel_map.hpp"
+#include "stages/candidates.hpp"
+#include "stages/frame.hpp"
+
+namespace frontier_surfels {
+
+class SurfelVisit {
+ public:
+  struct Found {
+    std::size_t in_view = 0, large = 0, removed = 0;  ///< surfels
+  };
+
+  explicit SurfelVisit(Commands& commands);
+
+  /// Candidates lose the voxels of surfels that stay. Nothing leaves the map yet.
+  /// @param observed, column_end  of ObservedSpace
+  /// @param candidates            of this frame; Candidates::find() has set counters() to zero
+  Found visit(const Frame& frame, const Camera& camera, const BitField& observed, const DeviceArray<cl_int>& column_end,
+              const RecentViews& views, SurfelMap& map, Candidates& candidates);
+
+  DeviceArray<cl_uint>& counters() { return counts_; }
+
+  /// @name A word for each page of the map's window, a bit for each surfel
+  /// @{
+  const BitField& in_view() const { return in_view_; }  ///< the surfel touches the grid
+  const BitField& large() const { return large_; }      ///< it must be split
+  const BitField& removed() const {
+    return removed_;
+  }  ///< it is to leave the map
+     /// @}
+
+ private:
+  Commands& commands_;
+  DeviceArray<cl_uint> counts_;
+  BitField in_view_, large_, removed_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,24 @@
+/// Recent views - our addition to the paper: candidates that a kept view knows are settled; kernels/stages/5_recent_views.cl.
+#pragma once
+
+#include "stages/candidates.hpp"
+#include "stages/frame.hpp"
+
+namespace frontier_surfels {
+
+class ViewSettling {
+ public:
+  explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands) {}
+
+  /// Takes those candidates off whose centre a kept view has seen.
+  void settle(const Frame& frame, const Camera& camera, RecentViews& views, Candidates& candidates);
+
+  /// [tiles of the grid][groups of VIEW_GROUP views]: of tiles with candidates left, a bit for each view that may know something near them.
+  const DeviceArray<cl_ushort>& tile_views() const { return tile_views_; }
+
+ private:
+  Commands& commands_;
+  DeviceArray<cl_ushort> tile_views_;
+};
+
+}  // namespace frontier_surfels
