@@ -1,4 +1,4 @@
-/// The map's blocks between frames: replaced as a whole, and taken out and in for the archive.
+/// Work on whole blocks between frames: replacing all of them, and moving single ones to and from the archive.
 #include <algorithm>
 #include <utility>
 
@@ -10,8 +10,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr float kFarthest = 1e6F;     // [m]; blocks are counted in 32 bits, and floats have 24
-constexpr double kLargestRadius = 4;  // [block]; the window, around all that surfels may reach, must not become large without end
+constexpr float kFarthest = 1e6F;     // [m]; block numbers have 32 bits, and floats are far coarser than the map there
+constexpr double kLargestRadius = 4;  // [block]; the window covers the reach of the largest surfel, so that must be bounded
 
 }  // namespace
 
@@ -23,8 +23,8 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   std::vector<std::uint32_t> slots;
   double largest = 0;
   for (const Surfel& surfel : surfels) {
-    if (!(surfel.position.array().abs() < kFarthest).all())  // nor is it a number
-      throw Error("A surfel lies more than 1000 km from the world's origin: this is no map of a robot's surroundings.");
+    if (!(surfel.position.array().abs() < kFarthest).all())  // true for NaN as well
+      throw Error("A surfel's position is not finite or more than 1000 km from the world's origin: give positions in metres.");
     const BlockKey block = block_of(surfel.position, block_size_);
     const BlockIndex::Pages* pages = index.find(block);
     if (pages == nullptr || alive[pages->back()] == ~cl_ulong{0}) {
@@ -45,13 +45,13 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   }
   grow(std::max(alive.size(), index_.end()));
   close_window();
-  // What was there is noted as changed as well.
+  // The pages of the old map count as changed, so that changes() reports their surfels as removed.
   const std::size_t before = index_.end();
   index.skip_to(before);
   for (; alive.size() < before; blocks.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) alive.push_back(0);
   surfels_.write(packed);
   alive_.write(alive);
-  changed_.write(std::vector<cl_ulong>(alive.size(), 0));  // a frame that failed may have left something there
+  changed_.write(std::vector<cl_ulong>(alive.size(), 0));  // a failed frame may have left bits
   page_block_.write(blocks);
   index_ = std::move(index);
   size_ = surfels.size();
@@ -73,7 +73,7 @@ std::vector<BlockKey> SurfelMap::blocks_changed_since(std::uint32_t frame) const
 std::vector<StoredBlock> SurfelMap::read_blocks(const std::vector<BlockKey>& blocks) const {
   std::vector<StoredBlock> stored;
   std::vector<Page> pages;
-  std::vector<std::size_t> owners;  // of the pages
+  std::vector<std::size_t> owners;  // index in `stored` for each page
   for (const BlockKey& block : blocks) {
     const BlockIndex::Pages* some = index_.find(block);
     if (some != nullptr) {
