@@ -1,4 +1,4 @@
-/// kernels/common/grid.cl: F, F^-1 and the bit operations on the device against double precision and loops over bits.
+/// kernels/common/grid.cl: F, F^-1 and bit operations on the device, compared with double precision and loops over bits.
 
 #include <gtest/gtest.h>
 
@@ -71,7 +71,7 @@ TestKernels& kernels() {
 cl_float4 pack4(const Vector3d& v) { return {{static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()), 0}}; }
 Vector3d unpack4(const cl_float4& v) { return {v.s[0], v.s[1], v.s[2]}; }
 
-/// fx and fy differ in most of them.
+/// Cameras, most of which have different fx and fy.
 std::vector<CameraSetup> grids() {
   std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));

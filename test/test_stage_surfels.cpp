@@ -1,4 +1,4 @@
-/// kernels/common/surfels.cl: LANES surfels at a time against one after the other; packing is tested in test_surfel_packing.
+/// kernels/common/surfels.cl: LANES surfels at a time compared with one after the other. test_surfel_packing tests the packing.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 using namespace reference;
 
-/// A work item LANES points or surfels; out: first all that comes of vectors, then the same one at a time.
+/// Each work item handles LANES points or surfels. Output: all results of vectors, followed by all results of one at a time.
 const char* const kSource = R"CL(
 __kernel void test_voxels(__global int4* out, __global const float4* in, const Grid g) {
   const int n = get_global_id(0), all = LANES * get_global_size(0);

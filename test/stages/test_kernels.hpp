@@ -1,4 +1,4 @@
-/// Kernels of a test's own, which call the functions of the library's kernel files.
+/// Test kernels that call functions of the library's kernel files.
 #pragma once
 
 #include <string>
@@ -24,7 +24,7 @@ class TestKernels {
     }
   }
 
-  /// Runs a kernel whose first argument is `out` and whose second one is `in`. @return `out_size` numbers
+  /// Runs a kernel whose first argument is `out` and whose second one is `in`. @return `out_size` values of `out`
   template <typename Out, typename In, typename... Args>
   std::vector<Out> run(const char* kernel, std::size_t items, const std::vector<In>& in, std::size_t out_size, const Args&... args) {
     const cl::Buffer from(device_.context, CL_MEM_READ_WRITE, std::max<std::size_t>(in.size(), 1) * sizeof(In));
