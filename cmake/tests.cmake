@@ -26,6 +26,11 @@ foreach(source ${TEST_SOURCES})
   target_link_libraries(${target} PRIVATE frontier_surfels_replay frontier_surfels_opencl GTest::gtest_main)
   add_test(NAME ${name} COMMAND ${target})
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+  if(name MATCHES "^test_(stage_|surfel_packing)")  # kernels are tested at both widths
+    add_test(NAME ${name}_lanes_1 COMMAND ${target})
+    set_tests_properties(${name}_lanes_1 PROPERTIES
+      ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE};FRONTIER_SURFELS_TEST_LANES=1" TIMEOUT 600)
+  endif()
   if(CATKIN_TOPLEVEL)  # in a workspace only `make tests` builds tests
     set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL TRUE)
     if(TARGET tests)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Makes DIR/report.html, one self-contained page, of the files that replay_score has written to DIR."""
+"""Makes DIR/report.html, a self-contained page, from the files that replay_score has written to DIR."""
 import base64
 import io
 import json
@@ -18,11 +18,11 @@ sys.path.insert(0, HERE)
 import report_plots  # noqa: E402
 import surfel_pictures  # noqa: E402
 
-# In the source tree; installed from lib/frontier_surfels, or from bin
+# Seen from scripts/ in the source tree, and from lib/frontier_surfels or bin in an installation
 TEMPLATE_FOLDERS = [os.path.join(HERE, folder) for folder in ('../share', '../../share/frontier_surfels', '../share/frontier_surfels')]
 NONE = '–'
 
-# What is known here of the paper's own figures: one core of an i7-7700, and a GTX 1070; 160 x 120 pixels.
+# The paper's own figures, as far as they are known here: one core of an i7-7700, and a GTX 1070; 160 x 120 pixels.
 PAPER_FRAME_CPU = '1130–1770'  # [ms]
 PAPER_FRAME_GPU = '83.5'  # [ms]
 PAPER_STAGES = {'sweeps': ('243', '4.9'), 'median': ('224', '2.0')}  # [ms]
@@ -32,7 +32,7 @@ PAPER_SURFELS = '2.4'  # [million]
 
 
 def percent(share):
-    """A share as text, with as many digits as say something."""
+    """A share as a percentage with a sensible number of digits."""
     if share is None:
         return NONE
     value = 100 * share
@@ -41,7 +41,7 @@ def percent(share):
 
 
 def number(value, digits=3):
-    """With so many significant digits, and thin spaces between thousands."""
+    """A number with `digits` significant digits, and thin spaces between thousands."""
     if value is None:
         return NONE
     if isinstance(value, int) or abs(value) >= 10 ** (digits - 1):
@@ -59,24 +59,24 @@ def read_frames(path):
 
 
 def headlines(summary):
-    """(figure, name, what it means) of what a reader wants to know first."""
+    """(figure, name, meaning) of the main results."""
     surfels, time = summary['surfels'], summary['time_ms']
     rate = f"{number(1000 / time['median'])} frames a second. " if time['median'] else ''
     result = [
-        (number(surfels['total']), 'surfels', f"{number(surfels['occupied'])} on measured surfaces, {number(surfels['frontier'])} where "
-         'empty space ends at the unknown.'),
-        (f"{number(time['median'])} ms", 'a frame (median)', f"{rate}The map's boundary is up to date after each of them.")]
+        (number(surfels['total']), 'surfels', f"{number(surfels['occupied'])} occupied: on measured surfaces, {number(surfels['frontier'])} "
+         'frontier: where space seen to be empty ends and the unknown begins.'),
+        (f"{number(time['median'])} ms", 'a frame (median)', f"{rate}The boundary is up to date after each frame.")]
     if 'exact' in summary:
         exact = summary['exact']
         result += [
-            (percent(exact['right']), 'right', 'of the surfels: a quarter of a radius behind is unknown, and just before it is known, '
-             'judged by the frames themselves.'),
-            (percent(exact['miss_2cm']), 'missed', 'of the true boundary: no surfel within 2 cm.')]
+            (percent(exact['right']), 'right', 'of the surfels: the point a quarter of a radius behind the surfel is unknown, the point 7/4 of a radius before it '
+             'is known, judged by the frames themselves.'),
+            (percent(exact['miss_2cm']), 'missed', 'of the exact boundary: there is no surfel within 2 cm.')]
     if 'octomap' in summary:
         octomap = summary['octomap']
         ratio = octomap['time_ms']['median'] / time['median'] if time['median'] else None
         result.append((f'{number(ratio)} ×', 'as fast as OctoMap', f"with voxels of {1000 * octomap['resolution']:g} mm on the same "
-                       'frames, the median of each; OctoMap without the search for its boundary.'))
+                       'frames: ratio of the medians. The time of OctoMap does not include the search for its boundary.'))
     return result
 
 
@@ -98,7 +98,7 @@ def time_rows(summary):
     names = [('mean', 'Mean'), ('median', 'Median'), ('p95', '95 % are below'), ('max', 'Largest')]
     rows = [(text, number(time[key]), number(octomap.get(key)), NONE, NONE) for key, text in names]
     return rows + [('Relative standard deviation', f"{time['rsd_percent']:.1f} %", NONE, NONE, NONE),
-                   ('As the paper tells it', NONE, NONE, PAPER_FRAME_CPU, PAPER_FRAME_GPU)]
+                   ("The paper's own figure", NONE, NONE, PAPER_FRAME_CPU, PAPER_FRAME_GPU)]
 
 
 def stage_rows(summary):
@@ -117,22 +117,22 @@ def memory_rows(summary, bytes_per_surfel):
     rows = [('Bytes a surfel', number(bytes_per_surfel), PAPER_BYTES_PER_SURFEL),
             ('Surfels [million]', number(surfels['total'] / 1e6), PAPER_SURFELS),
             ('Map [MB]', number(surfels['map_bytes'] / 1e6), PAPER_MAP_MB),
-            ('Device, the map included [MB]', number(memory['device']), NONE),
-            ('Process at its largest, yardsticks included [MB]', number(memory['peak_rss']), NONE)]
+            ('Device, with the map [MB]', number(memory['device']), NONE),
+            ('Process at its largest, with OctoMap and exact test [MB]', number(memory['peak_rss']), NONE)]
     if 'octomap' in summary:
         rows.append((f"OctoMap of {1000 * summary['octomap']['resolution']:g} mm [MB]", number(summary['octomap']['memory_mb']), NONE))
     return rows
 
 
 def exact_rows(summary):
-    names = [('right', 'Right: unknown behind, known before it'), ('buried', 'Buried: known on both sides'),
+    names = [('right', 'Right: unknown behind it, known before it'), ('buried', 'Buried: known on both sides'),
              ('floating', 'Floating: unknown on both sides'), ('flipped', 'Flipped: known only behind'),
              ('within_1v', 'Boundary at most 1 voxel away along the normal'),
              ('within_2v', 'Boundary at most 2 voxels away along the normal'),
              ('fdr_2cm', 'Boundary further than 2 cm away along the normal'),
              ('fdr_5cm', 'Boundary further than 5 cm away along the normal'),
              ('miss_1cm', 'No surfel within 1 cm'), ('miss_2cm', 'No surfel within 2 cm'), ('miss_5cm', 'No surfel within 5 cm'),
-             ('label_ok', 'Of those with one within 2 cm: its label is right')]
+             ('label_ok', 'Label is right, of the points with a surfel within 2 cm')]
     return [(text, percent(summary['exact'][key])) for key, text in names] if 'exact' in summary else []
 
 
@@ -147,7 +147,7 @@ def png(picture):
 
 
 def pictures(folder):
-    """(caption, image) of the map from outside and inside, and of OctoMap's boundary likewise."""
+    """(caption, image) of the map from outside and from inside, and the same of OctoMap's boundary."""
     trajectory = numpy.loadtxt(os.path.join(folder, 'trajectory.txt'), ndmin=2)
     positions, rotations = trajectory[:, 1:4], surfel_pictures.rotations_of(trajectory[:, 4:8])
     path = surfel_pictures.splats_of_path(positions)
@@ -162,9 +162,9 @@ def pictures(folder):
         splats = surfel_pictures.splats_of(vertices, marked)
         outside = outside or surfel_pictures.outside_camera(rotations, splats.position)
         red = '; red: errors of the exact test' if marked is not None else ''
-        result += [(f'{title} from outside; walls that turn their back are left out, orange: the path of the camera{red}.',
+        result += [(f'{title} from outside. Surfels that face away are left out; orange: path of the camera{red}.',
                     png(surfel_pictures.render(surfel_pictures.joined(splats, path), outside))),
-                   (f'{title} from inside, a little behind where the camera was in the middle of the recording{red}.',
+                   (f'{title} from inside, from a little behind the camera in the middle of the recording{red}.',
                     png(surfel_pictures.render(splats, inside)))]
     return result
 

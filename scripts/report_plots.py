@@ -1,4 +1,4 @@
-"""The report's plots, as SVG."""
+"""The plots of the report, as SVG."""
 import io
 
 import matplotlib
@@ -28,7 +28,7 @@ def panels(count):
 
 
 def time_per_frame(frames, stages):
-    """`frames`: table of frames.csv; `stages`: names of its columns with stage times, in their order."""
+    """Times per frame. `frames`: table of frames.csv; `stages`: names of its columns with the times of stages, in their order."""
     figure, (stacked, beside) = panels(2)
     index = range(len(frames))
     stacked.stackplot(index, [frames[name] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)
@@ -37,12 +37,12 @@ def time_per_frame(frames, stages):
     handles, labels = stacked.get_legend_handles_labels()
     stacked.legend(handles[::-1], labels[::-1], fontsize=7, loc='center left', bbox_to_anchor=(1, 0.5), handlelength=1)
 
-    beside.plot(index, frames['total'], color=TOTAL, linewidth=1, label='this map, its boundary included')
+    beside.plot(index, frames['total'], color=TOTAL, linewidth=1, label='this map, with its boundary')
     if 'octomap_ms' in frames.dtype.names:
         beside.plot(index, frames['octomap_ms'], color=OCTOMAP, linewidth=1, label='OctoMap, without its boundary')
     beside.set(xlabel='frame', ylabel='time [ms]', title='Whole frame', yscale='log', xlim=(0, max(len(frames) - 1, 1)))
     beside.yaxis.set_major_formatter(ticker.LogFormatter())
-    beside.yaxis.set_minor_formatter(ticker.LogFormatter(minor_thresholds=(2, 0.7)))  # numbers between powers of ten only on short axes
+    beside.yaxis.set_minor_formatter(ticker.LogFormatter(minor_thresholds=(2, 0.7)))  # on short axes, numbers between powers of ten are shown
     beside.legend(fontsize=8, loc='best')
     return svg(figure)
 
@@ -63,7 +63,7 @@ def map_per_frame(frames, bytes_per_surfel):
 
 
 def sweep(data, configured):
-    """Figure 19: shares over the varied parameter. `configured`: the value of the main run, or None."""
+    """The paper's figure 19: shares over the varied parameter. `configured`: the value of the main run, or None."""
     figure, (errors, right) = panels(2)
     values = [point['value'] for point in data['values']]
     curves = [(errors, 'octomap', 'fdr', 'FDR (OctoMap, 5 cm)', OCTOMAP, 's'),

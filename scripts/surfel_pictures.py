@@ -1,27 +1,27 @@
-"""Pictures of a cloud of surfels: discs splatted into a z-buffer, with numpy alone."""
+"""Pictures of surfels: draws discs into a z-buffer, with numpy alone."""
 import collections
 
 import numpy
 
-OCCUPIED = (0.80, 0.78, 0.74)  # where no colour was seen
+OCCUPIED = (0.80, 0.78, 0.74)  # of occupied surfels without a colour
 FRONTIER = (0.25, 0.50, 0.88)
 ERROR = (0.85, 0.13, 0.13)
 PATH = (1.00, 0.60, 0.05)
 
-SIZE = (900, 600)  # [pixel] width, height
+SIZE = (900, 600)  # [pixel] width and height of the report's pictures
 LARGEST_SPLAT = 24  # [pixel] radius
-MOST_PIXELS = 3e7  # under all splats together, for a picture to be drawn at twice its size and averaged
+MOST_PIXELS = 3e7  # maximum sum of the pixels of all splats for which a picture is drawn at twice its size and averaged
 
 TYPES = {'char': 'i1', 'uchar': 'u1', 'short': '<i2', 'ushort': '<u2', 'int': '<i4', 'uint': '<u4', 'float': '<f4', 'double': '<f8'}
 
-# rotation: world to camera, optical frame; focal: in picture widths
+# rotation: from the world to the optical frame; focal: focal length in widths of the picture
 Camera = collections.namedtuple('Camera', 'rotation position focal')
-# Arrays of n rows: position [m], normal, radius [m], color (0 to 1), and whether the back is drawn, too
+# Arrays of n rows: position [m], normal, radius [m], color (0 to 1), and two_sided: whether the back is drawn as well
 Splats = collections.namedtuple('Splats', 'position normal radius color two_sided')
 
 
 def read_ply(path):
-    """Vertices of a binary little endian PLY file, as a structured array."""
+    """The vertices of a binary little endian PLY file as a structured array."""
     with open(path, 'rb') as file:
         fields, count = [], 0
         for line in iter(file.readline, b''):
@@ -43,7 +43,7 @@ def columns(vertices, names):
 
 
 def splats_of(vertices, wrong=None):
-    """Occupied in its colour or grey, frontier blue, and what is marked in `wrong` red."""
+    """Splats of a map: occupied surfels in their colour or grey, frontier blue, and surfels with a mark in `wrong` red."""
     color = columns(vertices, ('red', 'green', 'blue')) / 255
     color[(color == 0).all(axis=1)] = OCCUPIED
     color[vertices['label'] == 0] = FRONTIER
@@ -54,7 +54,7 @@ def splats_of(vertices, wrong=None):
 
 
 def splats_of_path(positions):
-    """The camera's path as a chain of small orange discs."""
+    """The path of the camera as a chain of small orange discs."""
     steps = numpy.linspace(positions[:-1], positions[1:], 12, endpoint=False).reshape(-1, 3) if len(positions) > 1 else positions
     n = len(steps)
     return Splats(steps.astype(numpy.float32), numpy.zeros((n, 3), numpy.float32), numpy.full(n, 0.012, numpy.float32),
@@ -74,20 +74,19 @@ def rotations_of(quaternions):
 
 
 def outside_camera(rotations, cloud):
-    """A three-quarter view from above and behind the recording camera, far enough to see the whole cloud."""
-    up = -rotations[:, :, 1].mean(axis=0)  # the world's up is not known, but hardly anybody films upside down
+    """A camera that sees the whole cloud from above, obliquely and from behind the recording camera."""
+    up = -rotations[:, :, 1].mean(axis=0)  # which way is up in the world is not known, but a camera is hardly ever held upside down
     up /= numpy.linalg.norm(up) or 1
     forward = rotations[:, :, 2].mean(axis=0)
     forward -= up * (up @ forward)
-    if numpy.linalg.norm(forward) < 0.05:  # it looked all around, or straight down: any direction will do
+    if numpy.linalg.norm(forward) < 0.05:  # the camera looked all around or straight down: any direction will do
         forward = numpy.cross(up, numpy.eye(3)[numpy.argmin(abs(up))])
-    forward /= numpy.linalg.norm(forward)
     forward /= numpy.linalg.norm(forward)
     return framing(cloud, 0.62 * forward - 0.38 * numpy.cross(forward, up) - 0.68 * up, up, focal=1.1)
 
 
-def framing(cloud, direction, up, focal):
-    """A camera that looks along `direction` from where the cloud, but for stray points, fills the picture."""
+def framing(cloud, direction, up, focal, size=SIZE):
+    """A camera that looks along `direction` from where the cloud, except for stray points, fills the picture."""
     z = direction / numpy.linalg.norm(direction)
     x = numpy.cross(z, up)
     x /= numpy.linalg.norm(x)
@@ -96,27 +95,27 @@ def framing(cloud, direction, up, focal):
     low, high = numpy.percentile(p, [0.2, 99.8], axis=0)
     centre = (low + high) / 2
     p = p[((p >= low) & (p <= high)).all(axis=1)] - centre
-    half = 0.47 * numpy.array([1, SIZE[1] / SIZE[0]])  # of the picture, in its widths
+    half = 0.47 * numpy.array([1, size[1] / size[0]])  # of the picture, in its widths
     distance = (focal * abs(p[:, :2]) / half - p[:, 2:]).max() if len(p) else 1
     return Camera(rotation, rotation.T @ (centre - [0, 0, distance]), focal)
 
 
 def inside_camera(positions, rotations):
-    """What the camera saw in the middle of the recording, from a little further back."""
+    """The view of the recording camera in the middle of the recording, from a little further back."""
     middle = len(positions) // 2
     rotation = rotations[middle].T
     return Camera(rotation, positions[middle] - 0.25 * rotation[2], focal=0.72)
 
 
-def render(splats, camera):
-    """A picture[height][width][3] of the splats that face the camera: walls between it and what it looks into turn their back to it."""
-    picture = render_at(2, splats, camera)
-    return picture if picture is not None else render_at(1, splats, camera)
+def render(splats, camera, size=SIZE):
+    """A picture[height][width][3] of the splats that face the camera. Walls that turn their back to it do not hide what is behind them."""
+    picture = render_at(2, splats, camera, size)
+    return picture if picture is not None else render_at(1, splats, camera, size)
 
 
-def render_at(supersampling, splats, camera):
-    """As render(), each pixel the mean of supersampling^2; None if that would take too long."""
-    width, height = (supersampling * n for n in SIZE)
+def render_at(supersampling, splats, camera, size):
+    """Like render(); each pixel is the mean of supersampling^2. None if that would take too long."""
+    width, height = (supersampling * n for n in size)
     f = camera.focal * width
     to_surfel = splats.position - camera.position.astype(numpy.float32)
     p = to_surfel @ camera.rotation.T.astype(numpy.float32)
@@ -133,26 +132,26 @@ def render_at(supersampling, splats, camera):
     nearest = numpy.full(width * height, -1, numpy.int32)
     for part in numpy.array_split(numpy.arange(len(order)), len(order) // 50000 + 1):
         pixel, owner = covered_pixels(u[order[part]], v[order[part]], radius[part], flattening[part], width, height)
-        nearest[pixel] = order[part][owner]  # of equal pixels numpy keeps the last one assigned, which is the nearest
+        nearest[pixel] = order[part][owner]  # where pixels repeat, numpy keeps the last value, which is the nearest splat
     picture = shaded(nearest.reshape(height, width), splats, p[:, 2], camera)
     s = supersampling
     return picture.reshape(height // s, s, width // s, s, 3).mean(axis=(1, 3))
 
 
 def flattenings(to_surfel, normal, camera):
-    """e of every disc: seen at an angle it is the ellipse |d|^2 + (d.e)^2 <= radius^2 of pixel offsets d."""
+    """A vector e for each disc: seen at an angle, the disc is the ellipse |d|^2 + (d.e)^2 <= radius^2 of pixel offsets d."""
     cosine = abs((to_surfel * normal).sum(axis=1)) / numpy.linalg.norm(to_surfel, axis=1)
-    cosine = cosine.clip(0.5, 1)  # thinner ones, with normals that are not exact, would leave slits between neighbours
+    cosine = cosine.clip(0.5, 1)  # normals are not exact: thinner ellipses would leave gaps between neighbours
     across = normal @ camera.rotation[:2].T.astype(numpy.float32)
     across /= numpy.maximum(numpy.linalg.norm(across, axis=1, keepdims=True), 1e-6)
     return across * numpy.sqrt(1 / cosine ** 2 - 1)[:, None]
 
 
 def covered_pixels(u, v, radius, flattening, width, height):
-    """Pixels under the discs around (u, v), disc by disc, and the index of each one's disc."""
+    """The pixels under the discs around (u, v), disc by disc, and the index of the disc of each pixel."""
     square = numpy.mgrid[-LARGEST_SPLAT:LARGEST_SPLAT + 1, -LARGEST_SPLAT:LARGEST_SPLAT + 1].reshape(2, -1)
     distance = numpy.hypot(*square)
-    square = square[:, numpy.argsort(distance, kind='stable')].astype(numpy.int32)  # a smaller disc is the beginning of a larger one
+    square = square[:, numpy.argsort(distance, kind='stable')].astype(numpy.int32)  # the pixels of a smaller disc come first in those of a larger one
     area = numpy.searchsorted(numpy.sort(distance), radius, side='right')
 
     owner = numpy.repeat(numpy.arange(len(radius), dtype=numpy.int32), area)
@@ -165,7 +164,7 @@ def covered_pixels(u, v, radius, flattening, width, height):
 
 
 def shaded(nearest, splats, depth, camera):
-    """nearest[height][width] (index of a splat, or -1) lit from the camera; darker behind the rim of what stands before it."""
+    """The picture for nearest[height][width] (the index of a splat, or -1), lit from the camera and shaded behind rims."""
     picture = numpy.ones(nearest.shape + (3,), numpy.float32)
     drawn = nearest >= 0
     index = nearest[drawn]
@@ -179,7 +178,7 @@ def shaded(nearest, splats, depth, camera):
 
 
 def rim_shade(log_depth):
-    """Eye-dome lighting: a pixel is the darker the more its neighbours stand before it."""
+    """Eye-dome lighting: a pixel is darker if its neighbours are nearer to the camera."""
     hidden = numpy.zeros_like(log_depth)
     for axis in (0, 1):
         for shift in (-3, 3):

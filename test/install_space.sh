@@ -51,6 +51,7 @@ consumer() {
   program=$(find "$1" -type f -name consumer -perm -u=x -print -quit)
   [ -n "$(ldd "$program" | grep -F "$2")" ] || fail "the project was linked with another library than that of $2"
   "$program" "$1.ply" || fail "a project that uses the library does not run right ($1)"
+  "$(dirname "$program")/example" | grep -q "surfels are frontier" || fail "the program in README.md does not run right ($1)"
 }
 consumer plain "$prefix"
 if [ -e "$prefix/.catkin" ]; then

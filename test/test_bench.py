@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The command bench from outside: that everything runs and is written, never how fast.
+"""Tests the command bench: that everything runs and is written. Times are not tested.
 
 usage: test_bench.py BENCH MAKE_SYNTHETIC BENCH_TABLE
 """
@@ -82,7 +82,7 @@ class Bench(unittest.TestCase):
                 self.assertRegex(result.stderr, r'(?s)Usage: .*\nbench: [^\n]*\n$')
                 self.assertEqual(result.stdout, '')
 
-    def test_what_cannot_be_done_is_one_sentence(self):
+    def test_failures_are_reported_in_one_sentence(self):
         for sentence, arguments in [('no-such-recording', ['no-such-recording']),
                                     ('no-such.yaml', ['--config', 'no-such.yaml']),
                                     ('no-such-folder', [self.room, '--json', '/proc/no-such-folder/bench.json'])]:

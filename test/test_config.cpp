@@ -112,6 +112,15 @@ TEST(Config, AllProblemsAtOnce) {
   EXPECT_EQ(problems[3], "device_type is 'GPU': it must be any, cpu, gpu or accelerator.");
 }
 
+TEST(Config, LanesAreOneOrSixteen) {
+  Config config;
+  for (int lanes = 0; lanes <= 16; ++lanes) {
+    config.lanes = lanes;
+    const bool good = lanes == 0 || lanes == 1 || lanes == 16;
+    EXPECT_EQ(all_problems(config), good ? "" : "lanes is " + std::to_string(lanes) + ": it must be 0, 1 or 16.\n");
+  }
+}
+
 TEST(Config, EqualDepthsAreAProblem) {
   Config config;
   config.z_max = config.z_min;
@@ -144,8 +153,8 @@ std::string set_fault(const std::string& name, const std::string& value) {
 
 TEST(Config, SetFieldRefusesWithASentence) {
   EXPECT_EQ(set_fault("decimaton", "2"), "there is no parameter 'decimaton'; did you mean 'decimation'?");
-  EXPECT_EQ(set_fault("Z_MAX", "2"), "there is no parameter 'Z_MAX'; README.md lists all parameters.");
-  EXPECT_EQ(set_fault("", "2"), "there is no parameter ''; README.md lists all parameters.");
+  EXPECT_EQ(set_fault("Z_MAX", "2"), "there is no parameter 'Z_MAX'; doc/parameters.md lists all parameters.");
+  EXPECT_EQ(set_fault("", "2"), "there is no parameter ''; doc/parameters.md lists all parameters.");
   EXPECT_EQ(set_fault("decimation", "4.5"), "decimation is '4.5': it must be a whole number [pixel].");
   EXPECT_EQ(set_fault("th_d", "0.4x"), "th_d is '0.4x': it must be a number.");
   EXPECT_EQ(set_fault("th_d", ""), "th_d is '': it must be a number.");
@@ -242,11 +251,24 @@ TEST(ShippedFiles, PaperYamlIsTable1) {
   EXPECT_EQ(paper.median_votes, 14);
 }
 
-TEST(ShippedFiles, ReadmeHasTheParameterTable) {
-  const std::string readme = read_text(FRONTIER_SURFELS_SOURCE_DIR "/README.md");
-  EXPECT_TRUE(contains(readme, "<!-- parameters -->\n" + parameter_table() + "<!-- /parameters -->\n"))
-      << "The table in README.md is out of date. Put this between its marks:\n"
-      << parameter_table();
+TEST(ShippedFiles, ParametersMdHasTheTables) {
+  EXPECT_TRUE(contains(read_text(FRONTIER_SURFELS_SOURCE_DIR "/doc/parameters.md"), parameter_table()))
+      << "doc/parameters.md is out of date. Renew it with: replay_score --parameters > doc/parameters.md";
+}
+
+TEST(ParameterTable, HasAHeadingForEachGroup) {
+  ParameterTable table;
+  FieldInfo first{"first", "m", "one length", 0.5, 2}, second{"second", "", "whether there is one"};
+  first.group = second.group = "Some";
+  FieldInfo third{"third", "", "a name"};
+  third.group = "Others";
+  table(first, 1.0);
+  table(second, false);
+  table(third, std::string());
+  const std::string head = "| parameter | default | unit | range | meaning |\n|---|---|---|---|---|\n";
+  EXPECT_EQ(table.text(), "\n## Some\n\n" + head + "| `first` | 1 | m | 0.5 to 2 | one length |\n" +
+                              "| `second` | false |  |  | whether there is one |\n" + "\n## Others\n\n" + head +
+                              "| `third` | \"\" |  |  | a name |\n");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// Recordings in folders: both layouts, every fault, and the real sequences where they are.
+/// Reading of folders: both layouts, every fault, and the recorded sequences if they are there.
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
@@ -19,7 +19,7 @@ using frontier_surfels::replay::SourceOptions;
 
 namespace {
 
-/// The sentence that opening `path` fails with; empty if it does not fail.
+/// The message with which opening `path` fails; empty if it does not fail.
 std::string failure(const fs::path& path, const SourceOptions& options = {}) {
   try {
     open_source(path.string(), options);
@@ -48,7 +48,7 @@ SourceOptions part(int first, int last = -1, int stride = 1) {
   return options;
 }
 
-/// A folder that is gone after the test.
+/// A folder that is removed after the test.
 class FolderTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -60,7 +60,7 @@ class FolderTest : public testing::Test {
 
   void write_text(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
 
-  /// An image of 4 x 3 pixels that count up from `value`.
+  /// An image of 4 x 3 pixels with the values `value`, `value` + 1, ...
   void write_depth(const std::string& name, int value, int type = CV_16UC1) const {
     cv::Mat image(3, 4, CV_16UC1);
     for (int i = 0; i < 12; ++i) image.at<std::uint16_t>(i / 4, i % 4) = static_cast<std::uint16_t>(value + i);
@@ -74,7 +74,7 @@ class FolderTest : public testing::Test {
     ASSERT_TRUE(cv::imwrite((folder_ / name).string(), cv::Mat(size, CV_8UC3, cv::Scalar(200, 100, 50))));
   }
 
-  /// depth/000000.png ... with 1000, 2000, ... mm, poses at x = 0, 1, ...
+  /// Writes depth/000000.png, ... with 1000, 2000, ... mm, and poses at x = 0, 1, ...
   void write_sequence(int frames) const {
     std::string poses = "# stamp tx ty tz qx qy qz qw\n\n";
     for (int i = 0; i < frames; ++i) {
@@ -133,7 +133,7 @@ TEST_F(FolderTest, ViewsTheImagesInPlace) {
   RecordedFrame wrong = *frame;
   wrong.depth = cv::Mat(3, 4, CV_8UC1);
   EXPECT_THROW(wrong.view(), frontier_surfels::BadFrame);
-  EXPECT_TRUE(RecordedFrame().T_world_camera.matrix().hasNaN()) << "a pose that nobody has set must not look like one";
+  EXPECT_TRUE(RecordedFrame().T_world_camera.matrix().hasNaN()) << "a pose that was never set must not be valid";
 }
 
 TEST_F(FolderTest, NumbersWithoutZerosKeepTheirOrder) {
@@ -214,7 +214,7 @@ TEST_F(FolderTest, HonoursFirstLastAndStride) {
   EXPECT_EQ(frames[0].depth.at<std::uint16_t>(0, 0), 2000);
   EXPECT_EQ(frames[2].depth.at<std::uint16_t>(0, 0), 6000);
 
-  EXPECT_EQ(open(part(1, 100, 2))->size(), 3u) << "there are fewer: the end";
+  EXPECT_EQ(open(part(1, 100, 2))->size(), 3u) << "a last frame beyond the end means the end";
   EXPECT_TRUE(says(failure(folder_, part(7)), "7 frames"));
   EXPECT_TRUE(says(failure(folder_, part(-1)), "first"));
   EXPECT_TRUE(says(failure(folder_, part(3, 2)), "last"));
@@ -249,7 +249,7 @@ TEST_F(FolderTest, NamesTheLineThatIsMalformed) {
   }
 }
 
-/// TUM's layout: the stamps of depth, colour and poses differ.
+/// The layout of TUM RGB-D, where the stamps of depth, colour and poses differ.
 class TumFolderTest : public FolderTest {
  protected:
   void write_tum() const {
@@ -299,7 +299,7 @@ TEST_F(TumFolderTest, FrameWhoseImageIsMissingIsPassedOver) {
   const auto source = open();
   EXPECT_EQ(read_all(*source).size(), 1u);
   ASSERT_EQ(source->skipped().size(), 2u);
-  EXPECT_TRUE(says(source->skipped()[0], "no such image"));
+  EXPECT_TRUE(says(source->skipped()[0], "no such file"));
 }
 
 TEST_F(TumFolderTest, KnowsTheBenchmarksCamerasByName) {
@@ -324,7 +324,7 @@ TEST_F(TumFolderTest, KnowsTheBenchmarksCamerasByName) {
   }
 }
 
-/// A recorded sequence, where there is one.
+/// A recorded sequence, and some of its pixels.
 fs::path recorded(const std::string& name) {
   const char* wanted = std::getenv("FRONTIER_SURFELS_DATA");
   return fs::path(wanted ? wanted : FRONTIER_SURFELS_DATA_DIR) / name;

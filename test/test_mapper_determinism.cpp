@@ -80,6 +80,21 @@ TEST(MapperDeterminism, ForAnyNumberOfThreads) {
   }
 }
 
+/// The map is the same for work items that handle 16 points as vectors and for items that handle one.
+TEST(MapperDeterminism, AtEitherWidth) {
+  const Reference& reference = Reference::instance();
+  Config paper = load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/paper.yaml");
+  paper.decimation = 1;
+  for (Config config : {few_views(), paper}) {
+    SCOPED_TRACE(std::to_string(config.recent_views) + " views kept");
+    config.lanes = 16;
+    const std::vector<Surfel> wide = map_of(reference.frames, config);
+    config.lanes = 1;
+    EXPECT_GT(wide.size(), 20000u);
+    EXPECT_TRUE(same(wide, map_of(reference.frames, config)));
+  }
+}
+
 TEST(MapperDeterminism, MappersDoNotAffectEachOther) {
   const Reference& reference = Reference::instance();
   Mapper one(few_views()), other(few_views());

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The command replay_score from outside: usage, errors, and all that it writes about a small synthetic room.
+"""Tests the command replay_score: usage, errors, and all files that it writes about a small synthetic room.
 
 usage: test_replay_score.py REPLAY_SCORE MAKE_SYNTHETIC
 """
@@ -14,11 +14,13 @@ import tempfile
 import time
 import unittest
 
+import matplotlib.image
 import numpy
 
 PROGRAM, MAKE_SYNTHETIC = None, None
 FRAMES = 16
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
+SOURCES = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..')
 SURFEL = numpy.dtype([(name, '<f4') for name in ('x', 'y', 'z', 'nx', 'ny', 'nz', 'radius')] +
                      [(name, 'u1') for name in ('red', 'green', 'blue', 'label')])
 
@@ -38,7 +40,7 @@ def read_rows(folder):
 
 
 def read_surfels(folder, name='surfels.ply'):
-    """By its own reading of the header, so that a fault of the writer is not shared."""
+    """Reads the header itself, so that a fault of the program's own reader or writer is found."""
     with open(os.path.join(folder, name), 'rb') as file:
         content = file.read()
     header, body = content.split(b'end_header\n', 1)
@@ -64,7 +66,7 @@ class Usage(unittest.TestCase):
         self.assertEqual(result.stdout, '')
         self.assertFalse(os.path.exists(os.path.join(self.report, 'report.html')))
 
-    def test_wrong_usage_is_told_with_the_usage(self):
+    def test_wrong_usage_prints_the_usage(self):
         there = [self.folder.name, '--report', self.report]
         wrong = ['another', '--no-such-option', '--first -1', '--first 5 --last 4', '--stride 0', '--threads many',
                  '--octomap-resolution -1', '--octomap-resolution nan', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
@@ -72,17 +74,17 @@ class Usage(unittest.TestCase):
             with self.subTest(arguments=arguments):
                 self.check_refused(WRONG_USAGE, 'replay_score: .', arguments=arguments)
 
-    def test_all_faults_of_the_settings_are_told_at_once(self):
+    def test_all_faults_of_the_settings_are_reported_at_once(self):
         self.check_refused(WRONG_USAGE, 'no_such', 'z_max', 'decimation', arguments=[
             self.folder.name, '--report', self.report, '--set', 'no_such=1', '--set', 'z_max=far', '--set', 'decimation=0'])
 
     def test_a_setting_does_not_swallow_the_input(self):
         self.check_refused(FAILED, 'no-such-recording', arguments=['--report', self.report, '--set', 'th_d=0.3', 'no-such-recording'])
 
-    def test_what_cannot_be_done_is_one_sentence(self):
+    def test_failures_are_reported_in_one_sentence(self):
         for sentence, arguments in [('no-such-recording', ['no-such-recording', '--report', self.report]),
                                     ('report.*--report', [self.folder.name, '--report', '/proc/no-such-folder']),
-                                    ('a folder, and --live plays bags: make one with sequence_to_bag|--live needs ROS', [self.folder.name, '--report', self.report, '--live']),
+                                    ('a folder, but --live plays bags: make a bag of it with sequence_to_bag|--live needs ROS', [self.folder.name, '--report', self.report, '--live']),
                                     ('no-such.yaml', [self.folder.name, '--report', self.report, '--config', 'no-such.yaml'])]:
             with self.subTest(arguments=arguments):
                 self.check_refused(FAILED, sentence, arguments=arguments)
@@ -95,12 +97,16 @@ class Usage(unittest.TestCase):
             self.assertIn(option, usage.stdout)
         table = run('--parameters')
         self.assertEqual((table.returncode, table.stderr), (DONE, ''))
-        self.assertIn('th_d', table.stdout)
-        self.assertIn('recent_view_angle', table.stdout)
+        self.assertIn('| `recent_view_angle` |', table.stdout)
+        with open(os.path.join(SOURCES, 'doc', 'parameters.md'), encoding='utf-8') as file:
+            document = file.read()
+        # The node's own parameters come last; a program without ROS does not know them.
+        whole = document if '## ROS node' in table.stdout else document[:document.index('\n## ROS node')]
+        self.assertEqual(table.stdout, whole, 'renew it with: replay_score --parameters > doc/parameters.md')
 
 
 class SyntheticRoom(unittest.TestCase):
-    """One run with everything on, looked at by many tests."""
+    """Many tests look at the results of one run that has everything switched on."""
 
     @classmethod
     def setUpClass(cls):
@@ -159,7 +165,7 @@ class SyntheticRoom(unittest.TestCase):
         for code, name in enumerate(['right', 'buried', 'floating', 'flipped']):
             self.assertAlmostEqual((verdicts == code).mean(), summary['exact'][name], places=9)
 
-    def test_sweep_has_a_point_a_value(self):
+    def test_sweep_has_a_point_for_each_value(self):
         sweep = read_json(self.report, 'sweep.json')
         self.assertEqual(sweep['parameter'], 'th_d')
         self.assertEqual([point['value'] for point in sweep['values']], [0.2, 0.4])
@@ -178,7 +184,7 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(kinds.count('data:image/svg+xml'), 3)  # time, size, sweep
         self.assertIn(f"{read_json(self.report)['surfels']['total']:,}".replace(',', '\u202f'), page)
 
-    def test_what_is_switched_off_is_absent_and_nothing_old_stays(self):
+    def test_what_is_switched_off_is_absent_and_old_files_are_removed(self):
         report = os.path.join(self.folder.name, 'reused')
         os.mkdir(report)
         for name in ('octomap.ply', 'sweep.json', 'verdicts.bin'):
@@ -196,7 +202,7 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(read_surfels(report).size, summary['surfels']['total'])
 
     def test_report_of_an_incomplete_folder_is_refused(self):
-        script = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'scripts', 'replay_report.py')
+        script = os.path.join(SOURCES, 'scripts', 'replay_report.py')
         result = subprocess.run([script, self.room], capture_output=True, text=True, timeout=60)
         self.assertEqual(result.returncode, FAILED)
         self.assertRegex(result.stderr, r'^replay_report: [^\n]*summary\.json[^\n]*\n$')
@@ -207,7 +213,7 @@ class SyntheticRoom(unittest.TestCase):
         self.assertRegex(result.stderr, r'^replay_score: [^\n]*room[^\n]*\n$')
 
     def start_and_interrupt(self, report):
-        """With an OctoMap so fine that the run would take minutes."""
+        """Starts a run that would take minutes, because its OctoMap is very fine."""
         process = subprocess.Popen([PROGRAM, self.room, '--report', report, '--no-exact', '--octomap-resolution', '0.01'],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 60
@@ -218,7 +224,7 @@ class SyntheticRoom(unittest.TestCase):
 
     def test_second_interrupt_ends_at_once(self):
         process = self.start_and_interrupt(os.path.join(self.folder.name, 'ended'))
-        time.sleep(0.05)  # two signals that wait at the same time are one
+        time.sleep(0.05)  # two pending signals would be delivered as one
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=5)
         self.assertEqual(process.returncode, -signal.SIGINT)
@@ -234,6 +240,35 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(len(read_rows(report)), frames)
         self.assertEqual(len(read_surfels(report)), read_json(report)['surfels']['total'])
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
+
+
+class Picture(unittest.TestCase):
+    """README's picture."""
+
+    def blue_share(self, panel):
+        """Share of frontier among the pixels that show surfels."""
+        red, green, blue = (panel[..., n].astype(int) for n in range(3))
+        drawn = (panel.min(axis=2) < 240)
+        return ((blue > red + 50) & (blue > green + 30) & drawn).sum() / drawn.sum()
+
+    def test_frontier_shrinks(self):
+        script = os.path.join(SOURCES, 'scripts', 'exploration_picture')
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'picture.png')
+            result = subprocess.run([script, os.path.dirname(PROGRAM), path, '--frames', '48'], capture_output=True, text=True, timeout=500)
+            self.assertEqual(result.returncode, DONE, result.stderr)
+            picture = (255 * matplotlib.image.imread(path)[..., :3]).round()
+        self.assertEqual(picture.shape[1], 640)
+        rows = range(30, 250), range(290, 510)
+        first, last = (picture[rows[n]][:, 320 * n + 5:320 * n + 315] for n in range(2))
+        self.assertGreater(self.blue_share(first), 0.3)
+        self.assertLess(self.blue_share(last), self.blue_share(first) / 2)
+
+    def test_failure_is_one_sentence(self):
+        result = subprocess.run([os.path.join(SOURCES, 'scripts', 'exploration_picture'), '/no-such-folder', '/no-such-folder/picture.jpg'],
+                                capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, FAILED)
+        self.assertRegex(result.stderr, r'^exploration_picture: [^\n]*no-such-folder[^\n]*\n$')
 
 
 if __name__ == '__main__':

@@ -28,7 +28,7 @@ namespace {
   F(to_image.r22) F(to_image.t0) F(to_image.t1) F(to_image.t2) F(width) F(height) F(first_pixel) F(depth_step)
 #define VIEW_SURFEL_FIELDS(F) F(i) F(j) F(k) F(reach) F(n_x) F(n_y) F(n_z) F(n_k) F(ray_x) F(ray_y) F(slot) F(ragged)
 #define LIMITS_FIELDS(F) \
-  F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(min_gap) F(surface_depth) F(median_votes)
+  F(th_d) F(peak) F(thickness) F(hull_unknown_scale) F(split_radius) F(create_radius) F(normal_min) F(back_probe) F(front_probe) F(min_gap) F(surface_depth) F(median_votes)
 // clang-format on
 
 #define NAME(field) #field,

@@ -1,9 +1,8 @@
-/// kernels/common/surfels.cl: LANES surfels at a time compared with one after the other. test_surfel_packing tests the packing.
+/// kernels/common/surfels.cl and the marks of lanes.cl, LANES surfels at a time. test_surfel_packing tests the packing.
 
 #include <gtest/gtest.h>
 
 #include "frame/recent_views.hpp"
-#include "frame/view_grid.hpp"
 #include "stages/reference_surfels.hpp"
 #include "stages/test_kernels.hpp"
 
@@ -12,52 +11,47 @@ namespace {
 
 using namespace reference;
 
-/// Each work item handles LANES points or surfels. Output: all results of vectors, followed by all results of one at a time.
 const char* const kSource = R"CL(
-__kernel void test_voxels(__global int4* out, __global const float4* in, const Grid g) {
-  const int n = get_global_id(0), all = LANES * get_global_size(0);
-  float x[LANES], y[LANES], z[LANES];
-  for (int lane = 0; lane < LANES; ++lane) {
-    x[lane] = in[LANES * n + lane].x;
-    y[lane] = in[LANES * n + lane].y;
-    z[lane] = in[LANES * n + lane].z;
-  }
-  const Voxels v = voxels_at(&g, (Points){vload16(0, x), vload16(0, y), vload16(0, z)});
-  int i[LANES], j[LANES], k[LANES], inside[LANES];
-  vstore16(inside_grid16(&g, v), 0, inside);
-  vstore16(v.i, 0, i);
-  vstore16(v.j, 0, j);
-  vstore16(v.k, 0, k);
-  for (int lane = 0; lane < LANES; ++lane) {
-    out[LANES * n + lane] = (int4)(i[lane], j[lane], k[lane], inside[lane]);
-    const int3 one = voxel_of(to_grid(&g, in[LANES * n + lane].xyz));
-    out[all + LANES * n + lane] = (int4)(one, inside_grid(&g, one) ? -1 : 0);
-  }
+// out[3][n]: position and radius; normal; bits of the packed normal and the attributes.
+INLINE void store_surfels(const Surfels* s, int first, int count, __global float4* out) {
+  const Points normal = unpack_normals(s->normal);
+  store_elements(s->position.x, s->position.y, s->position.z, s->radius, first, out);
+  store_elements(normal.x, normal.y, normal.z, 0.0f, count + first, out);
+  store_elements(as_floatv(s->normal), as_floatv(s->attributes), 0.0f, 0.0f, 2 * count + first, out);
 }
-__kernel void test_load(__global float* out, __global const uint4* in, const Window window, const Transform T, const int4 block) {
-  const int n = get_global_id(0), all = LANES * get_global_size(0);
-  const Surfels s = load_surfels(&window, &T, in, block, LANES * n);
-  const Points normal = stored_normals(&s, &T);
-  const float16 fields[9] = {s.position.x, s.position.y, s.position.z, s.radius, normal.x, normal.y, normal.z, as_float16(s.normal),
-                             as_float16(s.attributes)};
-  for (int field = 0; field < 9; ++field) vstore16(fields[field], 0, out + field * all + LANES * n);
-  out += 9 * all;
-  for (int lane = LANES * n; lane < LANES * n + LANES; ++lane) {
-    const float3 p = transform_point(&T, surfel_position(&window, in[lane], block)), normal = rotate(&T, unpack_normal(in[lane].z));
-    const float one[9] = {p.x,      p.y,      p.z, surfel_radius(in[lane]), normal.x, normal.y, normal.z, as_float(in[lane].z),
-                          as_float(in[lane].w)};
-    for (int field = 0; field < 9; ++field) out[field * all + lane] = one[field];
-  }
+__kernel void test_load(__global float4* out, __global const uint4* in, const Window window, const int4 block) {
+  const int first = LANES * get_global_id(0);
+  const Surfels s = load_surfels(&window, in, block, first);
+  store_surfels(&s, first, LANES * get_global_size(0), out);
 }
-__kernel void test_lanes(__global ulong* out, __global const int* in) {
-  __local ushort lanes[PAGE_SLOTS / LANES];
-  for (int part = 0; part < PAGE_SLOTS / LANES; ++part) lanes[part] = (ushort)lane_bits(vload16(part, in + PAGE_SLOTS * get_global_id(0)));
-  out[get_global_id(0)] = pack_lanes(lanes);
+// Handles the slots from the last to the first. The pages belong to consecutive blocks along x.
+__kernel void test_slots(__global float4* out, __global const uint4* in, const Window window, __global const int4* page_block) {
+  const int first = LANES * get_global_id(0), count = LANES * get_global_size(0);
+  const Surfels s = surfels_at(&window, in, page_block, as_uintv(count - 1 - first - lane_numbers()));
+  store_surfels(&s, first, count, out);
+}
+__kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void test_shared_words(__global ulong* out, __global const int* in) {
+  __local SharedWord words[PAGE_GROUP / PAGE_ITEMS];
+  const int word = get_local_id(0) / PAGE_ITEMS, item = get_local_id(0) % PAGE_ITEMS;
+  words[word] = (SharedWord){{0xffff, 0xffff}};  // earlier contents must not matter
+  barrier(CLK_LOCAL_MEM_FENCE);
+  share_lane_bits(lane_bits(vloadv(get_global_id(0), in)), item, &words[word]);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0) out[get_global_id(0) / PAGE_ITEMS] = read_shared_word(&words[word]);
+}
+__kernel void test_stored_words(__global ulong* out, __global const int* in) {
+  store_lane_bits(lane_bits(vloadv(get_global_id(0), in)), get_global_id(0), (__global uint*)out);
 }
 __kernel void test_marks(__global int* out, __global const ulong* in) {
-  const int n = get_global_id(0);
-  for (int part = 0; part < PAGE_SLOTS / LANES; ++part)
-    vstore16(lane_marks(lanes_of_page(in[n], LANES * part)), part, out + PAGE_SLOTS * n);
+  const int n = get_global_id(0) / PAGE_ITEMS, first = LANES * (get_global_id(0) % PAGE_ITEMS);
+  vstorev(lane_marks(lanes_of_page(in[n], first)), get_global_id(0), out);
+}
+__kernel void test_comparisons(__global int4* out, __global const float4* in) {
+  const int first = LANES * get_global_id(0);
+  const Points p = load_points(in + first);
+  const intv less = MARK(p.x < p.y), both = MARK((p.x < p.y) & (p.y < p.z));
+  const floatv smaller = less ? p.x : p.y;
+  store_elements(less, both, ~less & MARK(p.y < p.z), as_intv(smaller), first, out);
 }
 )CL";
 
@@ -66,53 +60,38 @@ TestKernels& kernels() {
   return *kernels;
 }
 
-/// Points in the grid and around it, in the cuboid, behind the camera, far away, and at z_min to the last bit.
-std::vector<cl_float4> points(const Nuvg& grid, Random& random) {
-  std::vector<cl_float4> all;
-  const auto z_min = static_cast<float>(grid.z_min);
-  const auto add = [&](const Vector3d& p) {
-    all.push_back({{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0}});
-  };
-  for (int n = 0; n < 800; ++n) {
-    add(grid.from_grid({random.uniform(-5, grid.size_i + 5), random.uniform(-5, grid.size_j + 5), random.uniform(-5, grid.size_k + 5)}));
-    add(random.uniform(0, 100) * random.direction());
-    add({random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-grid.z_min, grid.z_min)});
-    add(grid.from_grid({random.whole(-1, grid.size_i) + 0.5, random.whole(-1, grid.size_j) + 0.5, random.whole(-1, grid.size_k) + 0.5}));
-    add({random.uniform(-1, 1), random.uniform(-1, 1), 0});
-    for (const float z : {std::nextafter(z_min, 0.0F), z_min, std::nextafter(z_min, 1.0F)})
-      add({random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), z});
+std::vector<cl_uint4> random_packed(int count, double block_size, Random& random) {
+  std::vector<cl_uint4> surfels;
+  for (int n = 0; n < count; ++n) {
+    Surfel surfel;
+    surfel.normal = (random.chance(0.2) ? Vector3d(0, 0, random.chance(0.5) ? 1 : -1) : random.direction()).cast<float>();
+    surfel.radius = static_cast<float>(std::pow(10, random.uniform(-4, 2)));
+    cl_uint4 packed = frontier_surfels::pack(surfel, BlockKey{0, 0, 0}, block_size);
+    packed.s[0] = random.bits();
+    packed.s[1] = (packed.s[1] & 0xffff0000U) | (random.bits() & 0xffffU);
+    packed.s[3] = random.bits();
+    surfels.push_back(packed);
   }
-  return all;
+  return surfels;
 }
 
-TEST(StageSurfels, VoxelsOfPoints) {
-  std::vector<CameraSetup> all = cameras();
-  all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
-  all.push_back(make_camera(20, 20, 10, 50, 60));
-  for (const CameraSetup& camera : all) {
-    SCOPED_TRACE(camera.name);
-    Random random(1);
-    const Nuvg grid(camera.intrinsics, camera.config);
-    const std::vector<cl_float4> p = points(grid, random);
-    const auto v =
-        kernels().run<cl_int4>("test_voxels", p.size() / LANES, p, 2 * p.size(), make_view_grid(camera.intrinsics, camera.config).grid);
-    std::size_t inside = 0, cuboid = 0;
-    Comparison comparison("inside");
-    for (std::size_t n = 0; n < p.size(); ++n) {
-      const cl_int4 &of_lane = v[n], &one = v[p.size() + n];
-      const Vector3d at(p[n].s[0], p[n].s[1], p[n].s[2]);
-      for (int axis = 0; axis < 4; ++axis) ASSERT_EQ(of_lane.s[axis], one.s[axis]) << at.transpose();
-      const Voxel expected = voxel_of(grid.to_grid(at), 1e-3);
-      if (expected.open) continue;
-      comparison.add(truth(grid.contains(expected.index)), of_lane.s[3] != 0, [&] { return "a point"; });
-      if (of_lane.s[3] == 0) continue;
-      ++inside;
-      cuboid += at.z() < grid.z_min;
-      EXPECT_EQ(Vector3i(of_lane.s[0], of_lane.s[1], of_lane.s[2]), expected.index) << at.transpose();
-    }
-    EXPECT_GT(inside, 50u) << "nothing was tested";
-    EXPECT_GT(cuboid, 10u) << "nothing was tested";
+float as_float(cl_uint bits) {
+  float value;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+/// @param block  block of the surfel, relative to the window's first block
+/// @param out    the kernel's output for the surfel, out[3][count] from the surfel's first entry on
+void expect_unpacked(const cl_uint4& packed, const BlockKey& block, double block_size, const cl_float4* out, std::size_t count) {
+  const Surfel host = unpack(packed, block, block_size);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(out[0].s[axis], host.position[axis]) << "must be exact";
+    EXPECT_NEAR(out[count].s[axis], host.normal[axis], 5e-7);
   }
+  EXPECT_EQ(out[0].s[3], host.radius);
+  const float bits[] = {as_float(packed.s[2]), as_float(packed.s[3])};
+  EXPECT_EQ(std::memcmp(out[2 * count].s, bits, sizeof(bits)), 0);
 }
 
 TEST(StageSurfels, Loading) {
@@ -121,41 +100,61 @@ TEST(StageSurfels, Loading) {
     for (int run = 0; run < 10; ++run) {
       const Window window = {random.whole(-2000, 2000),     random.whole(-9, 9), random.whole(-9, 9), 20, 20, 20,
                              static_cast<float>(block_size)};
-      const cl_int4 block = {{window.origin_x + random.whole(0, 19), window.origin_y + random.whole(0, 19), window.origin_z, 77}};
-      std::vector<cl_uint4> surfels;
-      for (int n = 0; n < 256; ++n) {
-        Surfel surfel;
-        surfel.normal = (random.chance(0.2) ? Vector3d(0, 0, random.chance(0.5) ? 1 : -1) : random.direction()).cast<float>();
-        surfel.radius = static_cast<float>(std::pow(10, random.uniform(-4, 2)));
-        cl_uint4 packed = frontier_surfels::pack(surfel, BlockKey{0, 0, 0}, block_size);
-        packed.s[0] = random.bits();
-        packed.s[1] = (packed.s[1] & 0xffff0000U) | (random.bits() & 0xffffU);
-        packed.s[3] = random.bits();
-        surfels.push_back(packed);
-      }
-      const Transform T = to_transform(random.pose(5, 3));
-      const auto out = kernels().run<float>("test_load", surfels.size() / LANES, surfels, 18 * surfels.size(), window, T, block);
-      for (std::size_t n = 0; n < 9 * surfels.size(); ++n) {
-        const std::size_t field = n / surfels.size();
-        if (field >= 4 && field < 7) {
-          EXPECT_NEAR(out[n], out[9 * surfels.size() + n], 5e-7) << "normal, " << field - 4;
-        } else {
-          EXPECT_EQ(std::memcmp(&out[n], &out[9 * surfels.size() + n], 4), 0) << "field " << field;
-        }
-      }
+      const BlockKey block = {random.whole(0, 19), random.whole(0, 19), 0};  // relative to the window's first block
+      const cl_int4 in_world = {{window.origin_x + block.x, window.origin_y + block.y, window.origin_z, 77}};
+      const std::vector<cl_uint4> surfels = random_packed(256, block_size, random);
+      const auto out =
+          kernels().run<cl_float4>("test_load", test_commands().chunks(surfels.size()), surfels, 3 * surfels.size(), window, in_world);
+      for (std::size_t n = 0; n < surfels.size(); ++n) expect_unpacked(surfels[n], block, block_size, &out[n], surfels.size());
     }
+}
+
+TEST(StageSurfels, OfAnySlots) {
+  Random random(4);
+  constexpr double kBlockSize = 0.5;
+  const Window window = {-300, 5, 70, 20, 20, 20, kBlockSize};
+  const std::vector<cl_uint4> surfels = random_packed(4 * PAGE_SLOTS, kBlockSize, random);
+  std::vector<cl_int4> page_block;
+  for (int page = 0; page < 4; ++page)
+    page_block.push_back({{window.origin_x + page, window.origin_y + 3, window.origin_z + 9 - page, 77}});
+  DeviceArray<cl_int4> blocks(test_commands());
+  blocks.write(page_block);
+  const std::size_t count = surfels.size();
+  const auto out = kernels().run<cl_float4>("test_slots", test_commands().chunks(count), surfels, 3 * count, window, blocks());
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t slot = count - 1 - n;
+    const int page = static_cast<int>(slot / PAGE_SLOTS);
+    expect_unpacked(surfels[slot], {page, 3, 9 - page}, kBlockSize, &out[n], count);
+  }
 }
 
 TEST(StageSurfels, BitsOfLanes) {
   Random random(3);
-  std::vector<cl_ulong> expected = {0, ~cl_ulong{0}};
-  for (int bit = 0; bit < 64; ++bit) expected.push_back(cl_ulong{1} << bit);
-  for (int n = 0; n < 200; ++n) expected.push_back(static_cast<cl_ulong>(random.bits()) << 32 | random.bits());
-  std::vector<cl_int> lanes;
-  for (const cl_ulong word : expected)
-    for (int bit = 0; bit < 64; ++bit) lanes.push_back(word >> bit & 1 ? -1 : 0);
-  EXPECT_TRUE(kernels().run<cl_ulong>("test_lanes", expected.size(), lanes, expected.size()) == expected);
-  EXPECT_TRUE(kernels().run<cl_int>("test_marks", expected.size(), expected, lanes.size()) == lanes);
+  std::vector<cl_ulong> words = {0, ~cl_ulong{0}};
+  for (int bit = 0; bit < 64; ++bit) words.push_back(cl_ulong{1} << bit);
+  while (words.size() < 272) words.push_back(static_cast<cl_ulong>(random.bits()) << 32 | random.bits());
+  std::vector<cl_int> marks;
+  for (const cl_ulong word : words)
+    for (int bit = 0; bit < 64; ++bit) marks.push_back(word >> bit & 1 ? -1 : 0);
+  const std::size_t items = test_commands().chunks(marks.size());
+  EXPECT_TRUE(kernels().run<cl_ulong>("test_shared_words", items, marks, words.size()) == words);
+  EXPECT_TRUE(kernels().run<cl_ulong>("test_stored_words", items, marks, words.size()) == words);
+  EXPECT_TRUE(kernels().run<cl_int>("test_marks", items, words, marks.size()) == marks);
+}
+
+TEST(StageSurfels, Marks) {
+  std::vector<cl_float4> in;
+  for (const float x : {-1.0F, 0.0F, 2.0F, std::nanf("")})
+    for (const float y : {-1.0F, 0.0F, 2.0F})
+      for (const float z : {-1.0F, 0.0F, 2.0F}) in.push_back({{x, y, z, 0}});
+  const auto out = kernels().run_lanes<cl_int4>("test_comparisons", in, 1);
+  for (std::size_t n = 0; n < in.size(); ++n) {
+    const auto [x, y, z, unused] = in[n].s;
+    EXPECT_EQ(out[n].s[0], x < y ? -1 : 0);
+    EXPECT_EQ(out[n].s[1], x < y && y < z ? -1 : 0);
+    EXPECT_EQ(out[n].s[2], !(x < y) && y < z ? -1 : 0);
+    EXPECT_EQ(as_float(out[n].s[3]), x < y ? x : y);
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// summary.json, frames.csv, --sweep's text and the progress bar, against values worked out by hand.
+// summary.json, frames.csv, the argument of --sweep and the progress bar, compared with values computed by hand.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,8 @@ std::vector<std::string> keys(const ordered_json& object) {
 
 using Keys = std::vector<std::string>;
 
-/// Frame i takes i + 1 ms, of which stage "sweeps" takes a quarter and "median", in odd frames only, a half; OctoMap 100 times as long.
+/// Frame i takes i + 1 ms. Stage "sweeps" takes a quarter of this, stage "median" a half, in odd frames only, and OctoMap 100 times as
+/// much.
 FrameRecord frame(int i) {
   FrameRecord record;
   record.report.stamp = 1305031102.160407 + i / 30.0;

@@ -152,26 +152,38 @@ TEST(SurfelPacking, RepeatedPackingLosesNothing) {
     }
 }
 
-/// Numbers per surfel. In: position (3), normal (3), radius. Out: packed (4), cell, unpacked position (3), normal (3), radius.
-constexpr std::size_t kIn = 7, kOut = 12;
+/// Numbers per surfel in the kernel's output: packed (4), cell and its block (4), then unpacked position and radius (4), normal (4).
+constexpr std::size_t kOut = 16;
 
 TestKernels& kernels() {
   static auto* const kernels = new TestKernels(R"(
-__kernel void pack_and_unpack(__global uint* all_out, __global const float* all_in, const Window window) {
-  __global const float* in = all_in + 7 * get_global_id(0);
-  __global uint* out = all_out + 12 * get_global_id(0);
-  uint cell;
-  const uint4 packed = pack_surfel(&window, vload3(0, in), in[6], vload3(1, in), SURFEL_RAGGED, &cell);
-  vstore4(packed, 0, out);
-  out[4] = cell;
-  const int x = cell % window.size_x, y = cell / window.size_x % window.size_y, z = cell / window.size_x / window.size_y;
-  const int4 block = (int4)(window.origin_x + x, window.origin_y + y, window.origin_z + z, 0);
-  vstore3(as_uint3(surfel_position(&window, packed, block)), 0, out + 5);
-  vstore3(as_uint3(unpack_normal(packed.z)), 0, out + 8);
-  out[11] = as_uint(surfel_radius(packed));
+// in[2] of each surfel: position and radius, normal
+__kernel void pack_and_unpack(__global int4* out, __global const float4* in, const Window window) {
+  const int first = LANES * get_global_id(0);
+  const intv at = first + lane_numbers();
+  const Quads place = gather_quads((__global const uint4*)in, as_uintv(2 * at)), direction = gather_quads((__global const uint4*)in, as_uintv(2 * at + 1));
+  const Points position = {as_floatv(place.x), as_floatv(place.y), as_floatv(place.z)},
+               normal = {as_floatv(direction.x), as_floatv(direction.y), as_floatv(direction.z)};
+  intv cell;
+  const Quads packed = pack_surfels(&window, position, as_floatv(place.w), normal, (uintv)(SURFEL_RAGGED), &cell);
+  const intv x = cell % window.size_x, y = cell / window.size_x % window.size_y, z = cell / window.size_x / window.size_y;
+  const Surfels s = unpack_surfels(&window, packed, (Points){convert_floatv(x), convert_floatv(y), convert_floatv(z)});
+  const Points n = unpack_normals(s.normal);
+  const Quads all[4] = {packed, {as_uintv(cell), as_uintv(x), as_uintv(y), as_uintv(z)},
+                        {as_uintv(s.position.x), as_uintv(s.position.y), as_uintv(s.position.z), as_uintv(s.radius)},
+                        {as_uintv(n.x), as_uintv(n.y), as_uintv(n.z), (uintv)(0)}};
+  for (int m = 0; m < 4; ++m) scatter_quads(all[m], 4 * at + m, (intv)(-1), (__global uint4*)out);
 }
 )");
   return *kernels;
+}
+
+/// Packs and unpacks surfels in a kernel. @return kOut numbers for each surfel
+std::vector<cl_uint> pack_and_unpack(const std::vector<Surfel>& surfels, const Window& window) {
+  std::vector<std::array<cl_float4, 2>> in;
+  for (const Surfel& s : surfels)
+    in.push_back({{{{s.position.x(), s.position.y(), s.position.z(), s.radius}}, {{s.normal.x(), s.normal.y(), s.normal.z(), 0}}}});
+  return kernels().run_lanes<cl_uint>("pack_and_unpack", in, kOut, window);
 }
 
 /// Random surfels in a window, in its local frame.
@@ -211,8 +223,8 @@ void expect_as_on_host(const Window& window, const Surfel& surfel, const std::ui
   EXPECT_LE((slow.position - surfel.position.cast<double>()).cwiseAbs().maxCoeff(), 0.65 * window.block_size / 65536);
   expect_radius(slow.radius, surfel.radius);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(as_float(out[5 + axis]), slow.position[axis]) << "must be exact";
-    EXPECT_NEAR(as_float(out[8 + axis]), slow.normal[axis], 1e-6);
+    EXPECT_EQ(as_float(out[8 + axis]), slow.position[axis]) << "must be exact";
+    EXPECT_NEAR(as_float(out[12 + axis]), slow.normal[axis], 1e-6);
   }
   EXPECT_EQ(as_float(out[11]), slow.radius);
 }
@@ -221,14 +233,7 @@ TEST(SurfelPacking, KernelsPackAsTheHostDoes) {
   Random random(4);
   for (const Window& window : {Window{0, 0, 0, 9, 7, 8, 0.5F}, Window{-4000, 100000, 3, 30, 12, 5, 0.5F}, Window{-1, -2, -3, 3, 3, 3, 8}}) {
     const std::vector<Surfel> surfels = surfels_of(window, reference::small_tests() ? 200 : 5000, random);
-    std::vector<float> in;
-    for (const Surfel& s : surfels) {
-      in.insert(in.end(), s.position.data(), s.position.data() + 3);
-      in.insert(in.end(), s.normal.data(), s.normal.data() + 3);
-      in.push_back(s.radius);
-    }
-    const auto out = kernels().run<cl_uint>("pack_and_unpack", surfels.size(), in, kOut * surfels.size(), window);
-    ASSERT_EQ(in.size(), kIn * surfels.size());
+    const std::vector<cl_uint> out = pack_and_unpack(surfels, window);
     for (std::size_t n = 0; n < surfels.size(); ++n) expect_as_on_host(window, surfels[n], &out[kOut * n]);
   }
 }
@@ -237,22 +242,18 @@ TEST(SurfelPacking, KernelsPackAsTheHostDoes) {
 TEST(SurfelPacking, KernelsRepackWithoutLoss) {
   Random random(5);
   const Window window = {0, 0, 0, 9, 7, 8, 0.5F};
-  std::vector<float> in;
-  const int count = reference::small_tests() ? 200 : 20000;
-  for (const Surfel& surfel : surfels_of(window, count, random)) {
+  std::vector<Surfel> surfels = surfels_of(window, reference::small_tests() ? 200 : 20000, random);
+  for (Surfel& surfel : surfels) {
     const BlockKey block = block_of(surfel.position, window.block_size);
-    const Surfel once = unpack(pack(surfel, block, window.block_size), block, window.block_size);
-    in.insert(in.end(), once.position.data(), once.position.data() + 3);
-    in.insert(in.end(), once.normal.data(), once.normal.data() + 3);
-    in.push_back(once.radius);
+    surfel = unpack(pack(surfel, block, window.block_size), block, window.block_size);
   }
-  const auto out = kernels().run<cl_uint>("pack_and_unpack", count, in, kOut * count, window);
-  for (int n = 0; n < count; ++n) {
+  const std::vector<cl_uint> out = pack_and_unpack(surfels, window);
+  for (std::size_t n = 0; n < surfels.size(); ++n) {
     for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_EQ(as_float(out[kOut * n + 5 + axis]), in[kIn * n + axis]);
-      EXPECT_NEAR(as_float(out[kOut * n + 8 + axis]), in[kIn * n + 3 + axis], 5e-7) << "normal " << n;
+      EXPECT_EQ(as_float(out[kOut * n + 8 + axis]), surfels[n].position[axis]);
+      EXPECT_NEAR(as_float(out[kOut * n + 12 + axis]), surfels[n].normal[axis], 5e-7) << "normal " << n;
     }
-    EXPECT_EQ(as_float(out[kOut * n + 11]), in[kIn * n + 6]);
+    EXPECT_EQ(as_float(out[kOut * n + 11]), surfels[n].radius);
   }
 }
 

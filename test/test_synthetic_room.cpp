@@ -1,4 +1,4 @@
-/// The synthetic room: what it renders agrees with its own exact geometry, and the sensor's faults are as stated.
+/// The synthetic room: its images agree with its exact geometry, and the errors of its sensor are as stated.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -41,7 +41,7 @@ TEST(Room, DistanceIsExactInFreeSpaceAndNegativeInSolids) {
   EXPECT_FALSE(room.inside_solid({0, 0, 1.5}));
 }
 
-/// A ray that marches by the distance to the nearest surface must end where cast() says.
+/// Marching along a ray by the distance to the nearest surface must end where cast() says.
 TEST(Room, CastAgreesWithDistance) {
   const Room room;
   std::mt19937 random(7);
@@ -76,6 +76,38 @@ TEST(Room, OrbitKeepsClearOfEverything) {
     turned = std::max(turned, Eigen::AngleAxisd(step.rotation()).angle());
   }
   EXPECT_LT(turned, 0.3);
+}
+
+/// Share of the room's surface, as seen from the middle, that some frame of a path sees.
+double seen_share(const Room& room, CameraPath path) {
+  const Intrinsics camera = synthetic_camera(160, 120);
+  const Vector3d middle(0.1, -1.0, 1.2);
+  std::mt19937 random(3);
+  std::normal_distribution<double> number;
+  int seen = 0;
+  constexpr int kPoints = 500;
+  for (int n = 0; n < kPoints; ++n) {
+    const Vector3d direction(number(random), number(random), number(random));
+    const Vector3d p_world = middle + 0.999 * room.cast(middle, direction)->distance * direction;
+    for (int index = 0; index < kFrames; ++index) {
+      const Eigen::Isometry3d T_world_camera = camera_pose(path, index, kFrames);
+      const Vector3d p = T_world_camera.inverse() * p_world;
+      const double u = camera.fx * p.x() / p.z() + camera.cx, v = camera.fy * p.y() / p.z() + camera.cy;
+      if (p.z() <= 0 || u < 0 || v < 0 || u > camera.width - 1 || v > camera.height - 1) continue;
+      if (room.depth(T_world_camera, camera, u, v) < p.z()) continue;
+      ++seen;
+      break;
+    }
+  }
+  return static_cast<double>(seen) / kPoints;
+}
+
+TEST(Room, ExploringSeesNearlyEverything) {
+  const Room room;
+  EXPECT_GT(seen_share(room, CameraPath::kExplore), 0.95);
+  EXPECT_LT(seen_share(room, CameraPath::kOrbit), 0.8) << "the other paths leave the ceiling out";
+  for (int index = 0; index < kFrames; ++index)
+    EXPECT_GT(room.distance(camera_pose(CameraPath::kExplore, index, kFrames).translation()), 0.25) << "frame " << index;
 }
 
 TEST(Room, RendersItsOwnDepth) {

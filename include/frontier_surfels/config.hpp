@@ -1,4 +1,4 @@
-/// All parameters with their defaults, units, meanings and ranges. This is the only place that states them.
+/// All parameters of the mapper. Defaults, units, meanings and ranges are stated here and nowhere else.
 #pragma once
 
 #include <string>
@@ -12,6 +12,7 @@ struct Config {
   std::string device_type = "any";
   int device_index = 0;
   int threads = 0;
+  int lanes = 0;
 
   // Working image and grid (paper 3.1)
   int decimation = 4;
@@ -46,91 +47,121 @@ struct Config {
   std::string map_folder;
   double eviction_radius = 20;
 
-  /// Every fault, one sentence each; empty if the configuration can be used.
+  /// A sentence for every fault; empty if the configuration can be used.
   std::vector<std::string> problems() const;
 };
 
 /// Description of a field.
 struct FieldInfo {
   const char* name;
-  const char* unit;     ///< "" if there is none
-  const char* meaning;  ///< one sentence
-  double lowest = 0;    ///< smallest allowed value, for numbers only
-  double highest = 0;   ///< largest allowed value, for numbers only
+  const char* unit;        ///< "" if there is none
+  const char* meaning;     ///< one sentence
+  double lowest = 0;       ///< smallest allowed value, for numbers only
+  double highest = 0;      ///< largest allowed value, for numbers only
+  const char* group = "";  ///< heading in the table of parameters
 };
 
 /// Calls visit(FieldInfo, field) for every field of `config` (Config or const Config), in order.
-/// YAML files, --set, the parameter table and ROS parameters all use this list.
+/// YAML files, --set, the table of parameters and ROS parameters all use this list.
 template <typename ConfigT, typename Visitor>
 void for_each_field(ConfigT& config, Visitor&& visit) {
-  visit(FieldInfo{"platform", "", "part of the OpenCL platform's name, in any case; empty: the first platform with a fitting device"},
+  const char* group = "Device";
+  const auto field = [&visit, &group](FieldInfo info, auto& value) {
+    info.group = group;
+    visit(info, value);
+  };
+  field(FieldInfo{"platform", "", "part of the name of the OpenCL platform, in any case; empty: the first one with a suitable device"},
         config.platform);
-  visit(FieldInfo{"device_type", "", "type of the device: any, cpu, gpu or accelerator"}, config.device_type);
-  visit(FieldInfo{"device_index", "", "number of the device among the fitting ones, from 0", 0, 255}, config.device_index);
-  visit(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
+  field(FieldInfo{"device_type", "", "type of the OpenCL device: any, cpu, gpu or accelerator"}, config.device_type);
+  field(FieldInfo{"device_index", "", "number of the suitable device to use, from 0", 0, 255}, config.device_index);
+  field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
+  field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 on other devices", 0, 16},
+        config.lanes);
 
-  visit(FieldInfo{"decimation", "pixel", "distance between the pixels of the depth image that are used, in both directions", 1, 64},
-        config.decimation);
-  visit(FieldInfo{"z_min", "m", "depth at which the grid changes from a cuboid to a pyramid; nearer measurements are ignored", 0.01, 100},
-        config.z_min);
-  visit(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
-  visit(FieldInfo{"padding_i", "voxel", "extent of the grid beyond the image, left and right", 1, 64}, config.padding_i);
-  visit(FieldInfo{"padding_j", "voxel", "extent of the grid beyond the image, above and below", 1, 64}, config.padding_j);
-  visit(FieldInfo{"padding_k", "voxel", "extent of the grid behind the camera", 1, 64}, config.padding_k);
+  group = "Working image and grid";
+  field(FieldInfo{"decimation", "pixel", "only every n-th column and row of the depth image is used", 1, 64}, config.decimation);
+  field(FieldInfo{"z_min", "m", "smallest depth that is used; nearer measurements are ignored", 0.01, 100}, config.z_min);
+  field(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
+  field(FieldInfo{"padding_i", "voxel", "width of the grid beyond the left and right edges of the image", 1, 64}, config.padding_i);
+  field(FieldInfo{"padding_j", "voxel", "height of the grid beyond the upper and lower edges of the image", 1, 64}, config.padding_j);
+  field(FieldInfo{"padding_k", "voxel", "depth of the grid behind the camera", 1, 64}, config.padding_k);
 
-  visit(FieldInfo{"carve_no_return", "", "a depth of +Inf means free space up to z_max"}, config.carve_no_return);
-  visit(FieldInfo{"carve_beyond_range", "", "a depth beyond z_max means free space up to z_max"}, config.carve_beyond_range);
+  group = "Observed space";
+  field(FieldInfo{"carve_no_return", "", "whether a depth of +Inf means that space is free up to z_max"}, config.carve_no_return);
+  field(FieldInfo{"carve_beyond_range", "", "whether a depth beyond z_max means that space is free up to z_max"},
+        config.carve_beyond_range);
 
-  visit(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger than this", 0, 0.99},
+  group = "Known space from the surfels";
+  field(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger than this", 0, 0.99},
         config.th_d);
-  visit(FieldInfo{"peak", "", "extremes of the sign field that are smaller than this are ignored", 0.01, 10}, config.peak);
-  visit(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
-  visit(FieldInfo{"median_votes", "voxel", "a voxel is known if at least this many are known among it and its 26 neighbours", 1, 27},
+  field(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);
+  field(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
+  field(FieldInfo{"median_votes", "voxel", "a voxel is known if at least this many are known among it and its 26 neighbours", 1, 27},
         config.median_votes);
 
-  visit(
-      FieldInfo{"recent_views", "", "maximum number of views kept for the exact test of new surfels; 0: the paper's method alone", 0, 1024},
-      config.recent_views);
-  visit(FieldInfo{"recent_view_distance", "m",
+  group = "Recent views";
+  field(FieldInfo{"recent_views", "", "maximum number of kept views; 0: the paper's method alone", 0, 1024}, config.recent_views);
+  field(FieldInfo{"recent_view_distance", "m",
                   "a view is kept if the camera has moved this far from every kept view, or turned by recent_view_angle", 0, 100},
         config.recent_view_distance);
-  visit(FieldInfo{"recent_view_angle", "deg",
+  field(FieldInfo{"recent_view_angle", "deg",
                   "a view is kept if the camera has turned this much from every kept view, or moved by recent_view_distance", 0, 180},
         config.recent_view_angle);
-  visit(FieldInfo{"remove_buried", "", "also remove surfels whose back side the new frame sees"}, config.remove_buried);
-  visit(FieldInfo{"min_gap", "m", "no frontier on sheets of unknown space that are thinner than this; 0: all frontier is kept", 0, 1},
-        config.min_gap);
-  visit(FieldInfo{"refine_surfels", "",
-                  "move new surfels towards the boundary within their voxel, and choose normals that point into known space"},
-        config.refine_surfels);
-  visit(FieldInfo{"surface_depth", "m",
-                  "surfels up to this far behind a measured surface are occupied; 0: only surfels in the voxel where observed space ends",
-                  0, 1},
-        config.surface_depth);
 
-  visit(FieldInfo{"map_folder", "", "folder that keeps the map on disk, while memory holds only blocks near the camera; empty: no folder"},
+  group = "Removal, creation and labels";
+  field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);
+  field(FieldInfo{"min_gap", "m", "no frontier on sheets of unknown space that are thinner than this; 0: all frontier is kept", 0, 1},
+        config.min_gap);
+  field(FieldInfo{"refine_surfels", "",
+                  "whether new surfels move from the centre of their voxel to the boundary, and turn if known space before them is thin"},
+        config.refine_surfels);
+  field(
+      FieldInfo{"surface_depth", "m",
+                "a surfel at most this far behind a measured surface is occupied; 0: only a surfel at the end of an observed column", 0, 1},
+      config.surface_depth);
+
+  group = "Maps larger than memory";
+  field(FieldInfo{"map_folder", "", "folder on disk that keeps the map, including the parts that are not in memory; empty: none"},
         config.map_folder);
-  visit(
-      FieldInfo{"eviction_radius", "m", "with a map_folder: blocks farther than this from the camera along any axis leave memory", 1, 1e6},
-      config.eviction_radius);
+  field(FieldInfo{"eviction_radius", "m",
+                  "with a map_folder: parts of the map farther than this from the camera, along any axis, leave memory", 1, 1e6},
+        config.eviction_radius);
 }
 
-/// Reads a flat YAML map of fields; fields that it lacks keep their defaults. problems() checks the ranges.
-/// @throws FileError  the file cannot be read
-/// @throws Error      every unknown, repeated or malformed entry, with file and line
+/// Reads a flat YAML map of fields; the others keep their defaults. Ranges are not checked here, but by problems().
+/// @throws FileError  if the file cannot be read
+/// @throws Error      names every unknown, repeated or malformed entry with file and line
 Config load_config(const std::string& path);
 
 /// Sets one field from text, as --set key=value does.
-/// @throws Error  there is no such field (the message suggests the nearest name), or the text is not of its type
+/// @throws Error  there is no such field (the message suggests the most similar name), or the text is not of its type
 void set_field(Config& config, const std::string& name, const std::string& value);
 
-/// "; did you mean 'x'?" with the name nearest to `name` among Config's fields and `more`. If none is near, says where to find all names.
+/// "; did you mean 'x'?" with the name most similar to `name` among the fields of Config and `more`. If none is similar, says where to
+/// find all names.
 std::string suggestion(const std::string& name, const std::vector<std::string>& more = {});
 
 /// The configuration as YAML that load_config reads back.
 std::string to_yaml(const Config& config);
 
-/// The table of all parameters in Markdown: name, default, unit, range, meaning.
+/// A table of parameters in Markdown, with a heading for each group: a visitor for for_each_field.
+class ParameterTable {
+ public:
+  void operator()(const FieldInfo& info, bool value);
+  void operator()(const FieldInfo& info, int value);
+  void operator()(const FieldInfo& info, double value);
+  void operator()(const FieldInfo& info, const std::string& value);
+
+  const std::string& text() const { return text_; }
+
+ private:
+  void add_row(const FieldInfo& info, const std::string& value, const std::string& range);
+
+  std::string group_;
+  std::string text_;
+};
+
+/// The table of the parameters of Config: name, default, unit, range, meaning.
 std::string parameter_table();
 
 }  // namespace frontier_surfels

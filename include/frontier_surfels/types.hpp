@@ -91,6 +91,12 @@ struct Surfel {
   std::uint32_t id = 0;                         ///< never changes; reused only after the surfel's removal was reported
 };
 
+/// Points that decide whether a surfel is right, as distances from its centre in radii: space should be unknown kBackProbe behind it,
+/// against the normal, and known kFrontProbe in front of it. The mapper places new surfels so that this holds; the exact test of the scores
+/// checks it.
+constexpr double kBackProbe = 0.25;
+constexpr double kFrontProbe = 1.75;
+
 /// Difference between the map at an earlier sequence number and the map now.
 struct Changes {
   std::uint64_t sequence = 0;          ///< of the map now

@@ -1,77 +1,58 @@
-// Non-uniform voxel grid (NUVG) - paper 3.1, eq. (2)-(3), supplement A - and the layout of its bit fields.
+// The non-uniform voxel grid (NUVG) of a view - paper 3.1, eq. (2)-(3), supplement A - and the layout of its bit fields.
 //
-// A bit field has one bit a voxel. Bits run along k in 64-bit words; neighbouring words are neighbours along i:
-//   word(i, j, w) = (j * words_k + w) * size_i + i,   bit k % 64 of word k / 64.
+// Grid coordinates (i, j, k) are real numbers; the voxel (i, j, k) is the cell around whole ones. F maps the camera frame to them, also
+// beyond the grid, and is continuous at z_min:
+//   z <  z_min, the cuboid:   (x fx / z_min + center_i, y fy / z_min + center_j, z / delta_min + padding_k)
+//   z >= z_min, the pyramid:  (x fx / z + center_i,     y fy / z + center_j,     f ln(z / z_min) + k_min)
+//
+// A bit field has a bit for each voxel. Bits run along k in 64-bit words, and neighbouring words are neighbours along i:
+//   bit k % 64 of word (j words_k + k / 64) size_i + i.
+// The field of candidates has the same bits, but its words lie tile by tile of VIEW_TILE x VIEW_TILE columns, which are asked for, and
+// listed, together (tile_word_index). There columns beyond the grid have words as well, whose bits are 0.
 
-#pragma OPENCL FP_CONTRACT OFF
+// Edge of voxels at depths z [m].
+INLINE floatv voxel_size(const Grid* g, floatv z) { return fmax(z, g->z_min) / g->f; }
 
-// Asks for the 64 bytes at an address ahead of their use. OpenCL's own prefetch() does nothing in PoCL.
-#if defined(ON_CPU) && defined(POCL_DEVICE_ADDRESS_BITS) && defined(__has_builtin)
-#if __has_builtin(__builtin_prefetch)
-#define PREFETCH(address) __builtin_prefetch((const void*)(uintptr_t)(address))
-#endif
-#endif
-#ifndef PREFETCH
-#define PREFETCH(address) prefetch((__global const uint16*)(address), 1)
-#endif
-
-#define INLINE static inline __attribute__((always_inline))
-
-INLINE float voxel_size(const Grid* g, float z) { return fmax(z, g->z_min) / g->f; }
-
-// Rounding to whole numbers of either sign; a device without an instruction for ceil and floor does these much faster.
-INLINE int ceil_int(float x) {
-  const int below = (int)x;
-  return below + ((float)below < x ? 1 : 0);
-}
-INLINE int floor_int(float x) {
-  const int above = (int)x;
-  return above - ((float)above > x ? 1 : 0);
+// F along k: grid coordinates of depths z [m].
+INLINE floatv layers_at(const Grid* g, floatv z) {
+  return z < g->z_min ? z / g->delta_min + (float)g->padding_k : g->f * natural_log(fmax(z, g->z_min) / g->z_min) + g->k_min;
 }
 
-INLINE int16 floor_int16(float16 x) {
-  const int16 above = convert_int16(x);
-  return above + (convert_float16(above) > x);
+// F: points of the camera frame [m] in grid coordinates.
+INLINE Points to_grid(const Grid* g, Points p) {
+  const floatv depth = fmax(p.z, g->z_min);
+  return (Points){p.x * g->fx / depth + g->center_i, p.y * g->fy / depth + g->center_j, layers_at(g, p.z)};
 }
 
-// ln x for normal x > 0, within 2e-7; unlike log() the same on every device. x = 2^e m, m around 1: ln m = 2 artanh((m - 1) / (m + 1)).
-#define DEFINE_NATURAL_LOG(NAME, FLOAT, AS_INT, AS_FLOAT, TO_FLOAT)                                                    \
-  INLINE FLOAT NAME(FLOAT x) {                                                                                         \
-    const FLOAT m = AS_FLOAT(((AS_INT(x) - 0x3f3504f3) & 0x007fffff) + 0x3f3504f3);                                    \
-    const FLOAT exponent = TO_FLOAT((AS_INT(x) - 0x3f3504f3) >> 23), s = (m - 1.0f) / (m + 1.0f), q = s * s;           \
-    return exponent * 0.69314718f + s * (2.0f + q * (0.66666667f + q * (0.4f + q * (0.28571429f + q * 0.22222222f)))); \
-  }
-DEFINE_NATURAL_LOG(natural_log, float, as_int, as_float, (float))
-DEFINE_NATURAL_LOG(natural_log16, float16, as_int16, as_float16, convert_float16)
+typedef struct {
+  intv i, j, k;
+} Voxels;
 
-// F: camera frame [m] -> grid coordinates. Defined, and continuous, beyond the grid as well.
-INLINE float3 to_grid(const Grid* g, float3 p) {
-  if (p.z < g->z_min) {
-    return (float3)(p.x * g->fx / g->z_min + g->center_i, p.y * g->fy / g->z_min + g->center_j, p.z / g->delta_min + (float)g->padding_k);
-  }
-  return (float3)(p.x * g->fx / p.z + g->center_i, p.y * g->fy / p.z + g->center_j, g->f * natural_log(p.z / g->z_min) + g->k_min);
+// The voxels that points of the camera frame lie in, which may be beyond the grid.
+INLINE Voxels voxels_at(const Grid* g, Points p) {
+  const Points c = to_grid(g, p);
+  return (Voxels){floor_int(c.x + 0.5f), floor_int(c.y + 0.5f), floor_int(c.z + 0.5f)};
 }
 
-// F^-1: grid coordinates -> camera frame [m].
-INLINE float3 from_grid(const Grid* g, float3 c) {
-  if (c.z < g->k_min) {
-    return (float3)((c.x - g->center_i) * g->z_min / g->fx, (c.y - g->center_j) * g->z_min / g->fy,
-                    (c.z - (float)g->padding_k) * g->delta_min);
-  }
-  const float z = g->z_min * exp((c.z - g->k_min) / g->f);
-  return (float3)((c.x - g->center_i) * z / g->fx, (c.y - g->center_j) * z / g->fy, z);
+INLINE intv inside_grid(const Grid* g, Voxels v) {
+  return MARK((v.i >= 0) & (v.j >= 0) & (v.k >= 0) & (v.i < g->size_i) & (v.j < g->size_j) & (v.k < g->size_k));
 }
 
-INLINE int3 voxel_of(float3 c) { return (int3)(floor_int(c.x + 0.5f), floor_int(c.y + 0.5f), floor_int(c.z + 0.5f)); }
+INLINE intv same_voxels(Voxels a, Voxels b) { return MARK((a.i == b.i) & (a.j == b.j) & (a.k == b.k)); }
 
-INLINE bool inside_grid(const Grid* g, int3 v) {
-  return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < g->size_i && v.y < g->size_j && v.z < g->size_k;
+// F^-1 of the centres of voxels in the grid's layers.
+//   layer_depth[size_k]: z of each layer's centre [m]
+INLINE Points voxel_centers(const Grid* g, __global const float* layer_depth, Voxels v) {
+  Points p;
+  p.z = gather_float(layer_depth, clamp(v.k, 0, g->size_k - 1));
+  const floatv depth = convert_floatv(v.k) < g->k_min ? g->z_min : p.z;
+  p.x = (convert_floatv(v.i) - g->center_i) * depth / g->fx;
+  p.y = (convert_floatv(v.j) - g->center_j) * depth / g->fy;
+  return p;
 }
 
 INLINE int word_index(const Grid* g, int i, int j, int w) { return (j * g->words_k + w) * g->size_i + i; }
 
-// Words of candidates lie tile by tile of VIEW_TILE x VIEW_TILE columns, which are asked for, and listed, together; columns beyond the grid
-// have words, too, without a candidate.
 #define TILE_COLUMNS (VIEW_TILE * VIEW_TILE)
 
 INLINE int grid_tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }
@@ -80,11 +61,26 @@ INLINE int tile_word_index(const Grid* g, int i, int j, int w) {
          i % VIEW_TILE;
 }
 
-INLINE bool test_bit(const Grid* g, __global const ulong* field, int3 v) {
-  return (field[word_index(g, v.x, v.y, v.z >> 6)] >> (v.z & 63)) & 1;
+// The 32-bit halves of words that voxels' bits are in, in word_index's order and in tile_word_index's; and the bits there.
+INLINE intv voxel_halves(const Grid* g, Voxels v) { return 2 * ((v.j * g->words_k + (v.k >> 6)) * g->size_i + v.i) + ((v.k >> 5) & 1); }
+INLINE intv candidate_halves(const Grid* g, Voxels v) {
+  const intv tile = (v.j / VIEW_TILE * g->words_k + (v.k >> 6)) * grid_tiles(g->size_i) + v.i / VIEW_TILE;
+  return 2 * (tile * TILE_COLUMNS + v.j % VIEW_TILE * VIEW_TILE + v.i % VIEW_TILE) + ((v.k >> 5) & 1);
+}
+INLINE intv half_bits(intv k) { return (intv)(1) << (k & 31); }
+
+// The voxels of candidates, which are listed by the numbers of their bits: 64 tile_word_index + bit.
+INLINE Voxels voxels_of(const Grid* g, intv numbers) {
+  const intv tiles = numbers / (64 * TILE_COLUMNS), columns = numbers / 64 & (TILE_COLUMNS - 1);
+  const intv rows = quotients(tiles, grid_tiles(g->size_i)), tiles_j = quotients(rows, g->words_k);
+  Voxels v;
+  v.i = VIEW_TILE * (tiles - rows * grid_tiles(g->size_i)) + columns % VIEW_TILE;
+  v.j = VIEW_TILE * tiles_j + columns / VIEW_TILE;
+  v.k = 64 * (rows - tiles_j * g->words_k) + (numbers & 63);
+  return v;
 }
 
-// Bits [from, to) of a word; both are clamped to 0..64.
+// Bits [from, to) of a word; both are clamped to 0 ... 64.
 INLINE ulong bit_run(int from, int to) {
   from = clamp(from, 0, 64);
   to = clamp(to, 0, 64);
@@ -94,21 +90,10 @@ INLINE ulong bit_run(int from, int to) {
 }
 
 INLINE int lowest_bit(ulong bits) { return 63 - (int)clz(bits & -bits); }
-
-// The same of fewer bits, a lane each of a vector.
-INLINE int lowest_lane(uint bits) { return 31 - (int)clz(bits & -bits); }
-
 INLINE int highest_bit(ulong bits) { return 63 - (int)clz(bits); }
 
 // Bits of the word's layers that exist; the last word may have fewer than 64.
 INLINE ulong valid_layers(const Grid* g, int w) { return bit_run(0, g->size_k - 64 * w); }
 
-INLINE float3 rotate(const Transform* T, float3 v) {
-  return (float3)(fma(v.x, T->r00, fma(v.y, T->r01, v.z * T->r02)), fma(v.x, T->r10, fma(v.y, T->r11, v.z * T->r12)),
-                  fma(v.x, T->r20, fma(v.y, T->r21, v.z * T->r22)));
-}
-
-INLINE float3 transform_point(const Transform* T, float3 p) {
-  return (float3)(fma(p.x, T->r00, fma(p.y, T->r01, fma(p.z, T->r02, T->t0))), fma(p.x, T->r10, fma(p.y, T->r11, fma(p.z, T->r12, T->t1))),
-                  fma(p.x, T->r20, fma(p.y, T->r21, fma(p.z, T->r22, T->t2))));
-}
+// Words of 32 pixels that hold a row of the working image.
+INLINE int image_words(const Grid* g) { return (g->width + 31) / 32; }

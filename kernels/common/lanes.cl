@@ -1,9 +1,68 @@
-// LANES points, surfels or candidates at once, as vectors. Comparisons of vectors give -1 where they hold, 0 elsewhere.
+// LANES points at once: one source for two widths.
+//
+// A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU, whose vectors are used that
+// way, and 1 on a graphics processor, which has a work item for each point. floatv, intv, uintv and ulongv hold one number for each of the
+// LANES: they are vectors of 16, or plain numbers. convert_..., as_..., vloadv and vstorev do for them what OpenCL's functions do for its
+// types. Only this file depends on the width.
+//
+// A mark says yes or no for each lane: an intv whose lanes are -1 or 0. Marks are joined by & | ~, and `mark ? a : b` chooses lane by lane.
+// Comparisons of vectors give -1 or 0, but comparisons of plain numbers give 1 or 0. A comparison that becomes a mark is therefore written
+// MARK(a < b), and several of them MARK((a < b) & (c < d)). A comparison that is only the condition of ?: needs no MARK.
+//
+// A list of n entries is handled in chunks of LANES. The last chunk may be filled partly.
 
-INLINE int16 lane_numbers(void) { return (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
+#pragma OPENCL FP_CONTRACT OFF
 
-// Bit n is lane n's, -1 or 0.
-INLINE uint lane_bits(int16 marks) {
+#define INLINE static inline __attribute__((always_inline))
+#define OVERLOADED __attribute__((overloadable))
+
+// Asks for the 64 bytes at an address ahead of their use. OpenCL's own prefetch() does nothing in PoCL.
+#if defined(ON_CPU) && defined(POCL_DEVICE_ADDRESS_BITS) && defined(__has_builtin)
+#if __has_builtin(__builtin_prefetch)
+#define PREFETCH(address) __builtin_prefetch((const void*)(uintptr_t)(address))
+#endif
+#endif
+#ifndef PREFETCH
+#define PREFETCH(address) prefetch((__global const uint16*)(address), 1)
+#endif
+
+#if LANES == 16
+#define OF_LANES(name) name##16
+#define vloadv(offset, from) vload16(offset, from)
+#define vstorev(values, offset, to) vstore16(values, offset, to)
+#define MARK(condition) (condition)
+#define GATHER(values, at)                                                                                                               \
+  values[at.s0], values[at.s1], values[at.s2], values[at.s3], values[at.s4], values[at.s5], values[at.s6], values[at.s7], values[at.s8], \
+      values[at.s9], values[at.sa], values[at.sb], values[at.sc], values[at.sd], values[at.se], values[at.sf]
+#elif LANES == 1
+#define OF_LANES(name) name
+#define vloadv(offset, from) ((from)[offset])
+#define vstorev(values, offset, to) ((to)[offset] = (values))
+#define MARK(condition) (-((condition) & 1))
+#define GATHER(values, at) values[at]
+#else
+#error "LANES must be 16 or 1"
+#endif
+
+typedef OF_LANES(float) floatv;
+typedef OF_LANES(int) intv;
+typedef OF_LANES(uint) uintv;
+typedef OF_LANES(ulong) ulongv;
+#define convert_floatv OF_LANES(convert_float)
+#define convert_intv OF_LANES(convert_int)
+#define convert_uintv OF_LANES(convert_uint)
+#define convert_longv OF_LANES(convert_long)
+#define convert_ulongv OF_LANES(convert_ulong)
+#define as_floatv OF_LANES(as_float)
+#define as_intv OF_LANES(as_int)
+#define as_uintv OF_LANES(as_uint)
+#define as_ulongv OF_LANES(as_ulong)
+
+#if LANES == 16
+INLINE intv lane_numbers(void) { return (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
+
+// A number whose bit n says whether lane n is marked.
+INLINE uint lane_bits(intv marks) {
   const int16 bits = marks & ((int16)(1) << lane_numbers());
   const int8 of_8 = bits.lo | bits.hi;
   const int4 of_4 = of_8.lo | of_8.hi;
@@ -11,93 +70,198 @@ INLINE uint lane_bits(int16 marks) {
   return (uint)(of_2.x | of_2.y);
 }
 
-// The other way round.
-INLINE int16 lane_marks(uint bits) { return -(((int16)((int)bits) >> lane_numbers()) & 1); }
+// Each lane gets the number of the lane before it, and the first one 0.
+INLINE ulongv from_lane_before(ulongv v) { return (ulong16)(0, v.s0123, v.s4567, v.s89ab, v.scd, v.se); }
 
-#define GATHER(values, at)                                                                                                               \
-  values[at.s0], values[at.s1], values[at.s2], values[at.s3], values[at.s4], values[at.s5], values[at.s6], values[at.s7], values[at.s8], \
-      values[at.s9], values[at.sa], values[at.sb], values[at.sc], values[at.sd], values[at.se], values[at.sf]
+// Stores LANES words in runs of 8: the first run at `to`, and the next one, if `more`, `stride` words behind it.
+INLINE void store_runs_of_8(ulongv words, __global ulong* to, int stride, bool more) {
+  vstore8(words.lo, 0, to);
+  if (more) vstore8(words.hi, 0, to + stride);
+}
 
-INLINE float16 gather(__global const float* values, int16 at) { return (float16)(GATHER(values, at)); }
-INLINE int16 gather_int(__global const int* values, int16 at) { return (int16)(GATHER(values, at)); }
+// Item n of those that fill a bit field puts the bits of its lanes into bits LANES n ... LANES (n + 1) - 1 of the field. Every item must do so.
+// At width 1 several items share a word: there the field must be zero before.
+INLINE void store_lane_bits(uint bits, uint item, __global uint* field) { ((__global ushort*)field)[item] = (ushort)bits; }
+
+// A word of 64 bits that the 64 / LANES items of a work-group that have its lanes put together in local memory.
+typedef struct {
+  ushort parts[4];
+} SharedWord;
+
+// Every item of the work-group does this, for its own word; a barrier must come between this and read_shared_word.
+INLINE void share_lane_bits(uint bits, int item, __local SharedWord* word) { word->parts[item] = (ushort)bits; }
+INLINE ulong read_shared_word(__local const SharedWord* word) {
+  ulong bits = 0;
+  for (int n = 0; n < 4; ++n) bits |= (ulong)word->parts[n] << (16 * n);
+  return bits;
+}
+#else
+INLINE intv lane_numbers(void) { return 0; }
+INLINE uint lane_bits(intv marks) { return (uint)(marks & 1); }
+INLINE ulongv from_lane_before(ulongv v) { return 0; }
+INLINE void store_runs_of_8(ulongv words, __global ulong* to, int stride, bool more) { *to = words; }
+INLINE void store_lane_bits(uint bits, uint item, __global uint* field) {
+  if (bits != 0) atomic_or(&field[item / 32], bits << (item % 32));
+}
 
 typedef struct {
-  float16 x, y, z;
+  uint halves[2];
+} SharedWord;
+
+INLINE void share_lane_bits(uint bits, int item, __local SharedWord* word) {
+  if (item < 2) word->halves[item] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (bits != 0) atomic_or(&word->halves[item / 32], bits << (item % 32));
+}
+INLINE ulong read_shared_word(__local const SharedWord* word) { return (ulong)word->halves[1] << 32 | word->halves[0]; }
+#endif
+
+// The other way round: marks of the lanes whose bits are set.
+INLINE intv lane_marks(uint bits) { return -(((intv)((int)bits) >> lane_numbers()) & 1); }
+
+INLINE bool any_lane(intv marks) { return lane_bits(marks) != 0; }
+
+// Number of the lowest set bit: loops over marked lanes are written for (uint left = lane_bits(marks); left != 0; left &= left - 1).
+INLINE int lowest_lane(uint bits) { return 31 - (int)clz(bits & -bits); }
+
+INLINE floatv gather_float(__global const float* values, intv at) { return (floatv)(GATHER(values, at)); }
+INLINE intv gather_int(__global const int* values, intv at) { return (intv)(GATHER(values, at)); }
+
+// Chunks that `count` entries make.
+INLINE int chunks_of(int count) { return (count + LANES - 1) / LANES; }
+
+// The entries of a chunk of a list. `exist` marks those before the end of the list; the other lanes repeat its last entry.
+INLINE intv load_chunk(__global const int* list, int count, int chunk, intv* exist) {
+  const intv n = chunk * LANES + lane_numbers();
+  *exist = MARK(n < count);
+  return gather_int(list, min(n, count - 1));
+}
+
+// Stores the numbers of the first `count` lanes, or of all LANES if there are not as many.
+INLINE void OVERLOADED store_first(intv values, int count, __global int* to) {
+  if (count >= LANES) {
+    vstorev(values, 0, to);
+    return;
+  }
+  int some[LANES];
+  vstorev(values, 0, some);
+  for (int n = 0; n < count; ++n) to[n] = some[n];
+}
+INLINE void OVERLOADED store_first(ulongv values, int count, __global ulong* to) {
+  if (count >= LANES) {
+    vstorev(values, 0, to);
+    return;
+  }
+  ulong some[LANES];
+  vstorev(values, 0, some);
+  for (int n = 0; n < count; ++n) to[n] = some[n];
+}
+
+// LANES elements of a buffer of uint4.
+typedef struct {
+  uintv x, y, z, w;
+} Quads;
+
+#if LANES == 16
+INLINE Quads transposed(uint16 a, uint16 b, uint16 c, uint16 d) {
+  return (Quads){(uint16)(a.s048c, b.s048c, c.s048c, d.s048c), (uint16)(a.s159d, b.s159d, c.s159d, d.s159d),
+                 (uint16)(a.s26ae, b.s26ae, c.s26ae, d.s26ae), (uint16)(a.s37bf, b.s37bf, c.s37bf, d.s37bf)};
+}
+INLINE Quads load_quads(__global const uint4* from) {
+  __global const uint* words = (__global const uint*)from;
+  return transposed(vload16(0, words), vload16(1, words), vload16(2, words), vload16(3, words));
+}
+INLINE Quads gather_quads(__global const uint4* from, uintv at) {
+  return transposed((uint16)(from[at.s0], from[at.s1], from[at.s2], from[at.s3]), (uint16)(from[at.s4], from[at.s5], from[at.s6], from[at.s7]),
+                    (uint16)(from[at.s8], from[at.s9], from[at.sa], from[at.sb]), (uint16)(from[at.sc], from[at.sd], from[at.se], from[at.sf]));
+}
+#else
+INLINE Quads load_quads(__global const uint4* from) { return (Quads){from->x, from->y, from->z, from->w}; }
+INLINE Quads gather_quads(__global const uint4* from, uintv at) { return load_quads(from + at); }
+#endif
+
+// Element at[n] becomes lane n's, for the lanes that are marked.
+INLINE void scatter_quads(Quads values, intv at, intv marks, __global uint4* to) {
+  uint x[LANES], y[LANES], z[LANES], w[LANES];
+  int place[LANES];
+  vstorev(values.x, 0, x);
+  vstorev(values.y, 0, y);
+  vstorev(values.z, 0, z);
+  vstorev(values.w, 0, w);
+  vstorev(at, 0, place);
+  for (uint left = lane_bits(marks); left != 0; left &= left - 1) {
+    const int n = lowest_lane(left);
+    to[place[n]] = (uint4)(x[n], y[n], z[n], w[n]);
+  }
+}
+
+INLINE void scatter_int(intv values, intv at, intv marks, __global int* to) {
+  int value[LANES], place[LANES];
+  vstorev(values, 0, value);
+  vstorev(at, 0, place);
+  for (uint left = lane_bits(marks); left != 0; left &= left - 1) to[place[lowest_lane(left)]] = value[lowest_lane(left)];
+}
+
+// Rounding to whole numbers of either sign, of lanes and, where that is another type, of a single number. OpenCL's own floor and ceil take
+// several times as long in PoCL.
+#define DEFINE_ROUNDING(FLOATS, INTS, TO_INTS, TO_FLOATS)                \
+  INLINE INTS OVERLOADED floor_int(FLOATS x) {                           \
+    const INTS whole = TO_INTS(x);                                       \
+    return whole - (TO_FLOATS(whole) > x ? (INTS)(1) : (INTS)(0));       \
+  }                                                                      \
+  INLINE INTS OVERLOADED ceil_int(FLOATS x) {                            \
+    const INTS whole = TO_INTS(x);                                       \
+    return whole + (TO_FLOATS(whole) < x ? (INTS)(1) : (INTS)(0));       \
+  }
+DEFINE_ROUNDING(floatv, intv, convert_intv, convert_floatv)
+#if LANES > 1
+DEFINE_ROUNDING(float, int, convert_int, convert_float)
+#endif
+
+// a / b for a >= 0 and b > 0: there is no instruction that divides vectors of whole numbers.
+INLINE intv quotients(intv a, int b) {
+  const float inverse = 1.0f / (float)b;
+  intv q = convert_intv(convert_floatv(a) * inverse);
+  q += convert_intv(convert_floatv(a - q * b) * inverse);  // what float has lost
+  const intv rest = a - q * b;
+  return q + MARK(rest < 0) - MARK(rest >= b);
+}
+
+// ln x for normal x > 0, within 2e-7; unlike log() it is the same on every device. x = 2^e m with m around 1, and
+// ln m = 2 artanh((m - 1) / (m + 1)).
+INLINE floatv natural_log(floatv x) {
+  const floatv m = as_floatv(((as_intv(x) - 0x3f3504f3) & 0x007fffff) + 0x3f3504f3);
+  const floatv exponent = convert_floatv((as_intv(x) - 0x3f3504f3) >> 23), s = (m - 1.0f) / (m + 1.0f), q = s * s;
+  return exponent * 0.69314718f + s * (2.0f + q * (0.66666667f + q * (0.4f + q * (0.28571429f + q * 0.22222222f))));
+}
+
+// LANES points or directions.
+typedef struct {
+  floatv x, y, z;
 } Points;
 
-typedef struct {
-  int16 i, j, k;
-} Voxels;
-
-INLINE Points rotate_points(const Transform* T, Points p) {
+INLINE Points rotated(const Transform* T, Points p) {
   return (Points){fma(p.x, T->r00, fma(p.y, T->r01, p.z * T->r02)), fma(p.x, T->r10, fma(p.y, T->r11, p.z * T->r12)),
                   fma(p.x, T->r20, fma(p.y, T->r21, p.z * T->r22))};
 }
 
-INLINE Points transform_points(const Transform* T, Points p) {
+INLINE Points transformed(const Transform* T, Points p) {
   return (Points){fma(p.x, T->r00, fma(p.y, T->r01, fma(p.z, T->r02, T->t0))), fma(p.x, T->r10, fma(p.y, T->r11, fma(p.z, T->r12, T->t1))),
                   fma(p.x, T->r20, fma(p.y, T->r21, fma(p.z, T->r22, T->t2)))};
 }
 
-INLINE Points add_scaled(Points p, float16 scale, Points direction) {
+INLINE Points scaled(floatv scale, Points p) { return (Points){scale * p.x, scale * p.y, scale * p.z}; }
+
+INLINE Points add_scaled(Points p, floatv scale, Points direction) {
   return (Points){p.x + scale * direction.x, p.y + scale * direction.y, p.z + scale * direction.z};
 }
 
-INLINE float16 lengths(Points p) { return sqrt(p.x * p.x + p.y * p.y + p.z * p.z); }
+INLINE floatv dot_products(Points a, Points b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-INLINE Points normalized(Points p) {
-  const float16 scale = 1.0f / lengths(p);
-  return (Points){scale * p.x, scale * p.y, scale * p.z};
+INLINE Points cross_products(Points a, Points b) {
+  return (Points){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// a / b for a >= 0, b > 0; there is no instruction for vectors of whole numbers.
-INLINE int16 quotients(int16 a, int b) {
-  const float inverse = 1.0f / (float)b;
-  int16 q = convert_int16(convert_float16(a) * inverse);
-  q += convert_int16(convert_float16(a - q * b) * inverse);  // what float has lost
-  const int16 rest = a - q * b;
-  return q + (rest < 0) - (rest >= b);
-}
+INLINE floatv lengths(Points p) { return sqrt(dot_products(p, p)); }
 
-INLINE float16 voxel_sizes(const Grid* g, float16 z) { return fmax(z, g->z_min) / g->f; }
-
-// Grid coordinates along k of points at depths z.
-INLINE float16 layers_at(const Grid* g, float16 z) {
-  return z < g->z_min ? z / g->delta_min + (float)g->padding_k : g->f * natural_log16(fmax(z, g->z_min) / g->z_min) + g->k_min;
-}
-
-// The voxels that points of the camera's frame lie in: F, rounded.
-INLINE Voxels voxels_at(const Grid* g, Points p) {
-  const float16 depth = fmax(p.z, g->z_min);
-  return (Voxels){floor_int16(p.x * g->fx / depth + g->center_i + 0.5f), floor_int16(p.y * g->fy / depth + g->center_j + 0.5f),
-                  floor_int16(layers_at(g, p.z) + 0.5f)};
-}
-
-INLINE int16 inside_grid16(const Grid* g, Voxels v) {
-  return (v.i >= 0) & (v.j >= 0) & (v.k >= 0) & (v.i < g->size_i) & (v.j < g->size_j) & (v.k < g->size_k);
-}
-
-// Where voxels are in bit fields, as numbers of 32-bit halves: in word_index's order, and in tile_word_index's; and their bits there.
-INLINE int16 voxel_halves(const Grid* g, Voxels v) { return 2 * ((v.j * g->words_k + (v.k >> 6)) * g->size_i + v.i) + ((v.k >> 5) & 1); }
-INLINE int16 candidate_halves(const Grid* g, Voxels v) {
-  const int16 tile = (v.j / VIEW_TILE * g->words_k + (v.k >> 6)) * grid_tiles(g->size_i) + v.i / VIEW_TILE;
-  return 2 * (tile * TILE_COLUMNS + v.j % VIEW_TILE * VIEW_TILE + v.i % VIEW_TILE) + ((v.k >> 5) & 1);
-}
-INLINE int16 half_bits(int16 k) { return (int16)(1) << (k & 31); }
-
-INLINE int16 same_voxels(Voxels a, Voxels b) { return (a.i == b.i) & (a.j == b.j) & (a.k == b.k); }
-
-// A row of the grid's voxels, and of the working image's pixels, has so many chunks of LANES, and words of 32.
-INLINE int grid_chunks(int size) { return (size + LANES - 1) / LANES; }
-INLINE int image_words(const Grid* g) { return (g->width + 31) / 32; }
-
-// Stores words of LANES columns from i, those that exist.
-INLINE void store_words(ulong16 words, const Grid* g, int i, __global ulong* field) {
-  if (i + LANES <= g->size_i) {
-    vstore16(words, 0, field);
-    return;
-  }
-  ulong some[LANES];
-  vstore16(words, 0, some);
-  for (int n = 0; i + n < g->size_i; ++n) field[n] = some[n];
-}
+INLINE Points normalized(Points p) { return scaled(1.0f / lengths(p), p); }

@@ -1,6 +1,7 @@
-// Lists in a fixed order from bit fields and counts, whatever the number of threads: counts, their prefix sum, then the entries.
+// Lists from bit fields and counts, in an order that does not depend on the number of threads: counts, their prefix sum, then the entries.
 
-// One work item a chunk of WORD_CHUNK words: their set bits.
+// One work item handles a chunk of WORD_CHUNK words: it counts their set bits.
+//   in  words[count];   out counts[chunks]
 __kernel void count_bits(__global const ulong* words, const uint count, __global uint* counts) {
   const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
   if (begin >= count) return;
@@ -9,8 +10,8 @@ __kernel void count_bits(__global const ulong* words, const uint count, __global
   counts[chunk] = sum;
 }
 
-// One work item: counts and lists at once, where a launch takes longer than the work.
-//   out list[room]: no more than there is room for;  total: of all set bits
+// One work item does all: it counts and lists the set bits, where a launch takes longer than that.
+//   in  words[count];   out list[room]: the numbers 64 n + bit of set bits, as many as there is room for;  total: number of all set bits
 __kernel void list_few_bits(__global const ulong* words, const uint count, __global uint* list, const uint room, __global uint* total) {
   if (get_global_id(0) > 0) return;
   uint at = 0;
@@ -21,7 +22,8 @@ __kernel void list_few_bits(__global const ulong* words, const uint count, __glo
   *total = at;
 }
 
-// One work item a chunk of SCAN_CHUNK values: their sum.
+// One work item handles a chunk of SCAN_CHUNK values: it adds them up.
+//   in  values[count];   out chunk_sums[chunks]
 __kernel void sum_chunks(__global const uint* values, const uint count, __global uint* chunk_sums) {
   const uint chunk = get_global_id(0);
   const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
@@ -31,8 +33,8 @@ __kernel void sum_chunks(__global const uint* values, const uint count, __global
   chunk_sums[chunk] = sum;
 }
 
-// One work item a chunk: values become the sums of all values before them.
-//   in  chunk_offsets: sum of all chunks before;   i/o values[count + 1]: the last becomes the total
+// One work item handles a chunk of SCAN_CHUNK values: they become the sums of all values before them.
+//   in  chunk_offsets[chunks]: sums of all chunks before;   i/o values[count + 1]: the last becomes the total
 __kernel void scan_chunks(__global uint* values, const uint count, __global const uint* chunk_offsets) {
   const uint chunk = get_global_id(0);
   const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
@@ -46,7 +48,8 @@ __kernel void scan_chunks(__global uint* values, const uint count, __global cons
   if (end == count) values[count] = sum;
 }
 
-// One work item: the prefix sum of few values, the total behind them.
+// One work item does all: the prefix sum of few values.
+//   i/o values[count + 1]: the last becomes the total
 __kernel void scan_few(__global uint* values, const uint count) {
   if (get_global_id(0) > 0) return;
   uint sum = 0;
@@ -58,8 +61,8 @@ __kernel void scan_few(__global uint* values, const uint count) {
   values[count] = sum;
 }
 
-// One work item a chunk of WORD_CHUNK words: the numbers 64 n + bit of their set bits.
-//   in  offsets: prefix sum of count_bits'
+// One work item handles a chunk of WORD_CHUNK words: it lists their set bits.
+//   in  words[count];  offsets[chunks]: prefix sum of count_bits';   out list: the numbers 64 n + bit of set bits
 __kernel void list_bits(__global const ulong* words, const uint count, __global const uint* offsets, __global uint* list) {
   const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
   if (begin >= count) return;

@@ -12,41 +12,25 @@ namespace frontier_surfels {
 #define SHARED_UINT std::uint32_t
 #endif
 
+// Sizes ---------------------------------------------------------------------------------------------------------------------------------
+
 // Tile of the grid whose sign field one work-group keeps in local memory. TILE_K is half a word of the bit fields.
 #define TILE_I 8
 #define TILE_J 8
 #define TILE_K 32
 
-// Tile of the grid that has one list of the recent views that may know something there. VIEW_TILE_K is a quarter of a word.
+// Tile of the grid that has one list of the kept views that may know something there. VIEW_TILE_K is a quarter of a word.
 #define VIEW_TILE 8
 #define VIEW_TILE_K 16
 
-// So many views can be kept at most.
-#define MOST_VIEWS 1024
-
-// Side of the blocks of a view's image whose largest depth is known [pixel].
-#define VIEW_BLOCK 8
-
-// So many rows of the grid one work item observes.
+// Rows of the grid that one work item observes.
 #define SPACE_ROWS 8
 
-// Images of views are kept in patches of PATCH_COLUMNS x PATCH_ROWS pixels, row by row, and so are the pixels of a patch: one is 64 bytes.
-// Points near each other are asked for together, and a row of pixels would be of use for one of them.
-#define PATCH_COLUMNS 8
-#define PATCH_ROWS 4
+// The tables of a camera have rows of voxels that are filled up to whole chunks of this size.
+#define TABLE_CHUNK 16
 
-// So many candidates, or views, one work item handles at once, as vectors of 16; and the numbers that a view then has.
-#define LANES 16
-#define VIEW_LANE_FIELDS 19
-
-// Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels.
-#define SIGN_FIELD_ONE 256
-
-// Numbers of surfels that kernels count as they go.
-#define COUNT_IN_VIEW 0
-#define COUNT_LARGE 1
-#define COUNT_REMOVED 2
-#define COUNTS 3
+// Words behind the bit field of observed space: vectors are read beyond the end of its last row.
+#define SPARE_WORDS 16
 
 // Elements that one work item adds up in a prefix sum.
 #define SCAN_CHUNK 64
@@ -57,12 +41,84 @@ namespace frontier_surfels {
 // Surfels of a page of the map: a bit each in the words that say something of a page.
 #define PAGE_SLOTS 64
 
-// Work items that go through a page's surfels, LANES each, and of groups of such: several pages.
-#define PAGE_ITEMS (PAGE_SLOTS / LANES)
+// Work items of the groups that go through the window's pages: they have several pages, or one.
 #define PAGE_GROUP 64
 
-// Work items that sort new surfels by block, one after the other each its share.
+// Work items that sort new surfels by block, each its share.
 #define SORT_CHUNKS 64
+
+// Kept views ----------------------------------------------------------------------------------------------------------------------------
+
+// Maximum number of kept views.
+#define MOST_VIEWS 1024
+
+// Side of the blocks of a view's image whose largest depth is known [pixel].
+#define VIEW_BLOCK 8
+
+// Images of views are kept in patches of PATCH_COLUMNS x PATCH_ROWS pixels, row by row, and so are the pixels of a patch: one is 64 bytes.
+// Points near each other are asked for together, and a row of pixels would be of use for one of them.
+#define PATCH_COLUMNS 8
+#define PATCH_ROWS 4
+
+// Views come in groups: a bit each in a word of 16 bits. Their numbers lie by fields: [groups][VIEW_LANE_FIELDS][VIEW_GROUP].
+#define VIEW_GROUP 16
+
+// Fields of a view there. R, t: this frame's camera -> the view's camera; the rest: intrinsics of its image, and where that starts.
+#define VIEW_LANE_R00 0
+#define VIEW_LANE_R01 1
+#define VIEW_LANE_R02 2
+#define VIEW_LANE_R10 3
+#define VIEW_LANE_R11 4
+#define VIEW_LANE_R12 5
+#define VIEW_LANE_R20 6
+#define VIEW_LANE_R21 7
+#define VIEW_LANE_R22 8
+#define VIEW_LANE_T0 9
+#define VIEW_LANE_T1 10
+#define VIEW_LANE_T2 11
+#define VIEW_LANE_FX 12
+#define VIEW_LANE_FY 13
+#define VIEW_LANE_CX 14
+#define VIEW_LANE_CY 15
+#define VIEW_LANE_WIDTH 16
+#define VIEW_LANE_HEIGHT 17
+#define VIEW_LANE_FIRST_PIXEL 18  // bits of a uint
+#define VIEW_LANE_FIELDS 19
+
+// Numbers of the method ------------------------------------------------------------------------------------------------------------------
+// Those that depend on parameters, or that the host needs as well, are in Limits below.
+
+// Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels. - Supplement B
+#define SIGN_FIELD_ONE 256
+
+// Surfels in view are those whose ellipsoid comes so near to the grid; generous, as more of them change nothing [voxel]. - Paper 3.4
+#define REACH_MARGIN 1.5f
+
+// How often a surfel is split in four within a frame at most. - Paper 3.4
+#define SPLIT_LEVELS 6
+
+// Paths that section 3.2 of the paper must walk are at most so far from a candidate, along each axis: the median looks one voxel around,
+// and the hull at the cells beside a path's [voxel].
+#define LINE_MARGIN 2
+
+// New surfels slide along their normals by at most SLIDE_STEPS steps of SLIDE_STEP, a step being left in hand; a candidate is therefore
+// asked for within VIEW_BOX_MARGIN of its voxel's centre [voxel]. - Ours
+#define SLIDE_STEP 0.1f
+#define SLIDE_STEPS 4
+#define VIEW_BOX_MARGIN 0.55f
+
+// PROBES candidates of a tile show which kept views should be asked first. Then FIRST_VIEWS are asked before the candidates left are listed
+// anew, then twice as many and so on. Both decide only how long it takes. - Ours
+#define PROBES 2
+#define FIRST_VIEWS 6
+
+// Names of numbers -----------------------------------------------------------------------------------------------------------------------
+
+// Numbers of surfels that kernels count as they go.
+#define COUNT_IN_VIEW 0
+#define COUNT_LARGE 1
+#define COUNT_REMOVED 2
+#define COUNTS 3
 
 // Bit fields of the sign field's events: EVENT_PLANES for each family of paths (i, j, k), in this order.
 #define EVENT_ENTER_FORWARD 0
@@ -84,6 +140,8 @@ namespace frontier_surfels {
 #define SURFEL_OCCUPIED (1u << 24)
 #define SURFEL_COLORED (1u << 25)
 #define SURFEL_RAGGED (1u << 26)  // known space is thin here: the normal finds it, but says nothing of the paths around
+
+// Structures -----------------------------------------------------------------------------------------------------------------------------
 
 // The non-uniform voxel grid of one view - paper 3.1, eq. (2)-(3).
 typedef struct {
@@ -132,18 +190,20 @@ typedef struct {
   SHARED_UINT ragged;      // 1: opens no path to known space, only closes it
 } ViewSurfel;
 
-// Limits of the method, from the configuration.
+// Limits of the method: from the configuration, or numbers of the paper (in brackets).
 typedef struct {
-  float th_d;
-  float peak;               // in steps of 1 / SIGN_FIELD_ONE
-  float thickness;          // [voxel]
-  float hull_unknown_scale;
-  float split_radius;       // surfels of this radius or more are split [voxel]
-  float create_radius;      // of a new surfel [voxel]
-  float normal_min;         // shorter sums of directions make no surfel
-  float min_gap;            // frontier on a thinner sheet of unknown is left out [m]; 0: all is kept
-  float surface_depth;      // so far behind a measured surface a surfel is occupied [m]
-  SHARED_INT median_votes;
+  float th_d;                // smallest cosine between normal and path that counts - supplement B
+  float peak;                // smallest extreme of the sign field that counts, in steps of 1 / SIGN_FIELD_ONE - 3.2
+  float thickness;           // half an ellipsoid's length along the normal [voxel] - supplement B
+  float hull_unknown_scale;  // the hull's ellipses of surfels that say "unknown" are larger by this (1.5) - supplement C
+  float split_radius;        // surfels of this radius or more are split (2 sqrt 3) [voxel] - 3.4
+  float create_radius;       // of a new surfel (sqrt 3 / 2) [voxel] - 3.5
+  float normal_min;          // shorter sums of directions make no surfel (0.01) - 3.5, eq. (15)
+  float back_probe;          // so far behind a surfel space should be unknown [radii] - ours: kBackProbe
+  float front_probe;         // so far before a new surfel space should be known [voxel] - ours: kFrontProbe radii
+  float min_gap;             // frontier on a thinner sheet of unknown is left out; 0: all is kept [m] - ours
+  float surface_depth;       // a surfel so little behind a measured surface is occupied [m] - ours
+  SHARED_INT median_votes;   // - 3.2, eq. (8)
 } Limits;
 
 #ifndef __OPENCL_VERSION__
@@ -152,7 +212,7 @@ static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
 static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
-static_assert(sizeof(Limits) == 10 * 4, "Limits must have no padding");
+static_assert(sizeof(Limits) == 12 * 4, "Limits must have no padding");
 }  // namespace frontier_surfels
 #endif
 

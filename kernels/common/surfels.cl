@@ -1,105 +1,98 @@
-// The map's surfels and pages.
+// The map's surfels and pages, and LANES surfels at once.
 //
-// The map is made of pages of PAGE_SLOTS surfels, each page of one block of the world; slot = PAGE_SLOTS page + n.
-//   surfels[slots]: 16 bytes each. x: position x, y and y's lower half: z, in 65536ths of the block; y's upper half: radius [m] as a 16-bit
-//     float; z: normal, octahedral, in 32767ths; w: attributes (common/shared.h)
-//   alive[pages]: which slots hold a surfel;   page_block[pages]: x, y, z of the block, w: the frame that changed the page last
-//   changed[pages]: which slots this frame has changed, for pages of this frame's window
+// The map is made of pages of PAGE_SLOTS surfels, each page of one block of the world. Surfel n of a page is in slot PAGE_SLOTS page + n.
+//   surfels[slots]: 16 bytes each. x: position x, and y in the upper half; y: position z, and in the upper half the radius [m] as a 16-bit
+//     float; z: normal, octahedral, two coordinates of 16 bits in steps of 1 / 32767; w: attributes (common/shared.h). Positions are counted
+//     in 65536ths of the block's edge.
+//   alive[pages]: a bit for each slot that holds a surfel
+//   page_block[pages]: x, y, z of the block; w: number of the frame that changed the page last
+//   changed[pages]: a bit for each slot that this frame has changed, for pages of this frame's window
 //
-// Where a stage goes through all surfels of a page, one work item does LANES of them.
+// Where a stage goes through all surfels of the window's pages, PAGE_ITEMS work items share a page and handle LANES surfels each.
 
-// A positive float as 16 bits (IEEE half precision), rounded to nearest. Too small or large ones become the nearest that there is.
-INLINE uint float_to_half(float x) { return (as_uint(clamp(x, 6.2e-5f, 65000.0f)) + 0x1000u - (112u << 23)) >> 13; }
-INLINE float half_to_float(uint bits) { return as_float((bits << 13) + (112u << 23)); }
+#define PAGE_ITEMS (PAGE_SLOTS / LANES)
 
-INLINE uint pack_normal(float3 n) {
-  float2 p = n.xy / (fabs(n.x) + fabs(n.y) + fabs(n.z));
-  if (n.z < 0.0f) p = (float2)(p.x < 0.0f ? fabs(p.y) - 1.0f : 1.0f - fabs(p.y), p.y < 0.0f ? fabs(p.x) - 1.0f : 1.0f - fabs(p.x));
-  return ((uint)floor_int(32767.0f * p.x + 0.5f) & 0xffff) | ((uint)floor_int(32767.0f * p.y + 0.5f) << 16);
+// Positive floats as 16 bits (IEEE half precision), rounded to nearest. Those that are too small or too large become the nearest that exist.
+INLINE uintv floats_to_halves(floatv x) { return (as_uintv(clamp(x, 6.2e-5f, 65000.0f)) + 0x1000u - (112u << 23)) >> 13; }
+INLINE floatv halves_to_floats(uintv bits) { return as_floatv((bits << 13) + (112u << 23)); }
+
+INLINE uintv pack_normals(Points n) {
+  const floatv sum = fabs(n.x) + fabs(n.y) + fabs(n.z), x = n.x / sum, y = n.y / sum;
+  const floatv folded_x = x < 0.0f ? fabs(y) - 1.0f : 1.0f - fabs(y), folded_y = y < 0.0f ? fabs(x) - 1.0f : 1.0f - fabs(x);
+  const uintv low = as_uintv(floor_int(32767.0f * (n.z < 0.0f ? folded_x : x) + 0.5f)),
+              high = as_uintv(floor_int(32767.0f * (n.z < 0.0f ? folded_y : y) + 0.5f));
+  return (low & 0xffff) | (high << 16);
 }
 
-INLINE float3 unpack_normal(uint bits) {
-  float3 n = (float3)((float)((int)(bits << 16) >> 16), (float)((int)bits >> 16), 0.0f);  // whole numbers: exact until it is normalised
+INLINE Points unpack_normals(uintv bits) {
+  Points n = {convert_floatv(as_intv(bits << 16) >> 16), convert_floatv(as_intv(bits) >> 16), 0.0f};  // whole: exact until normalised
   n.z = 32767.0f - fabs(n.x) - fabs(n.y);
-  const float fold = fmax(-n.z, 0.0f);
+  const floatv fold = fmax(-n.z, 0.0f);
   n.x += n.x < 0.0f ? fold : -fold;
   n.y += n.y < 0.0f ? fold : -fold;
-  return n / sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
+  return normalized(n);
 }
 
-// Position in the local frame [m]; exact.
-INLINE float3 surfel_position(const Window* window, uint4 surfel, int4 block) {
-  const float3 corner =
-      (float3)((float)(block.x - window->origin_x), (float)(block.y - window->origin_y), (float)(block.z - window->origin_z));
-  const float3 within = (float3)((float)(surfel.x & 0xffff), (float)(surfel.x >> 16), (float)(surfel.y & 0xffff)) + 0.5f;
-  return (corner + within / 65536.0f) * window->block_size;
+typedef struct {
+  Points position;  // local frame, where nothing else is said [m]
+  floatv radius;    // [m]
+  uintv normal;     // as the map keeps it: unpack_normals() gives it in the local frame
+  uintv attributes;
+} Surfels;
+
+// Unpacks surfels; positions are exact.
+//   corners: of their blocks, counted in blocks from the window's
+INLINE Surfels unpack_surfels(const Window* window, Quads packed, Points corners) {
+  Surfels s;
+  s.position.x = (corners.x + (convert_floatv(packed.x & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
+  s.position.y = (corners.y + (convert_floatv(packed.x >> 16) + 0.5f) / 65536.0f) * window->block_size;
+  s.position.z = (corners.z + (convert_floatv(packed.y & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
+  s.radius = halves_to_floats(packed.y >> 16);
+  s.normal = packed.z;
+  s.attributes = packed.w;
+  return s;
 }
 
-INLINE float surfel_radius(uint4 surfel) { return half_to_float(surfel.y >> 16); }
+// LANES surfels of a page of `block`.
+//   first: slot of the first of them, a multiple of LANES
+INLINE Surfels load_surfels(const Window* window, __global const uint4* surfels, int4 block, uint first) {
+  const Points corners = {(float)(block.x - window->origin_x), (float)(block.y - window->origin_y), (float)(block.z - window->origin_z)};
+  return unpack_surfels(window, load_quads(surfels + first), corners);
+}
 
-// A surfel as the map keeps it. p: local frame;   out cell: of the window
-INLINE uint4 pack_surfel(const Window* window, float3 p, float radius, float3 normal, uint attributes, uint* cell) {
-  const float3 blocks = p / window->block_size;
-  const int x = clamp(floor_int(blocks.x), 0, window->size_x - 1), y = clamp(floor_int(blocks.y), 0, window->size_y - 1),
-            z = clamp(floor_int(blocks.z), 0, window->size_z - 1);
-  *cell = (uint)((z * window->size_y + y) * window->size_x + x);
-  const uint q_x = (uint)clamp((int)((blocks.x - (float)x) * 65536.0f), 0, 65535),
-             q_y = (uint)clamp((int)((blocks.y - (float)y) * 65536.0f), 0, 65535),
-             q_z = (uint)clamp((int)((blocks.z - (float)z) * 65536.0f), 0, 65535);
-  return (uint4)(q_x | (q_y << 16), q_z | (float_to_half(radius) << 16), pack_normal(normal), attributes);
+// The surfels of any slots.
+INLINE Surfels surfels_at(const Window* window, __global const uint4* surfels, __global const int4* page_block, uintv slots) {
+  const Quads block = gather_quads((__global const uint4*)page_block, slots / PAGE_SLOTS);
+  const Points corners = {convert_floatv(as_intv(block.x) - window->origin_x), convert_floatv(as_intv(block.y) - window->origin_y),
+                          convert_floatv(as_intv(block.z) - window->origin_z)};
+  return unpack_surfels(window, gather_quads(surfels, slots), corners);
+}
+
+// Surfels as the map keeps them.
+//   p, normal: local frame;   out cell: of the window
+INLINE Quads pack_surfels(const Window* window, Points p, floatv radius, Points normal, uintv attributes, intv* cell) {
+  const floatv x = p.x / window->block_size, y = p.y / window->block_size, z = p.z / window->block_size;
+  const intv block_x = clamp(floor_int(x), 0, window->size_x - 1), block_y = clamp(floor_int(y), 0, window->size_y - 1),
+             block_z = clamp(floor_int(z), 0, window->size_z - 1);
+  *cell = (block_z * window->size_y + block_y) * window->size_x + block_x;
+  const uintv q_x = as_uintv(clamp(convert_intv((x - convert_floatv(block_x)) * 65536.0f), 0, 65535)),
+              q_y = as_uintv(clamp(convert_intv((y - convert_floatv(block_y)) * 65536.0f), 0, 65535)),
+              q_z = as_uintv(clamp(convert_intv((z - convert_floatv(block_z)) * 65536.0f), 0, 65535));
+  return (Quads){q_x | (q_y << 16), q_z | (floats_to_halves(radius) << 16), pack_normals(normal), attributes};
 }
 
 INLINE bool is_alive(__global const ulong* alive, uint slot) { return ((alive[slot / PAGE_SLOTS] >> (slot % PAGE_SLOTS)) & 1) != 0; }
 
-// Bit of a slot in a word of its page, as 32-bit halves.
+// The bit of a slot in the word of its page, whose words are given as 32-bit halves.
 INLINE void set_slot(__global uint* halves, uint slot) { atomic_or(&halves[slot / 32], 1u << (slot % 32)); }
 INLINE void clear_slot(__global uint* halves, uint slot) { atomic_and(&halves[slot / 32], ~(1u << (slot % 32))); }
 
-// LANES surfels of a page, camera frame.
-typedef struct {
-  Points position;
-  float16 radius;
-  uint16 normal, attributes;  // as the map keeps them
-} Surfels;
-
-//   first: slot of the first of them, a multiple of LANES
-INLINE Surfels load_surfels(const Window* window, const Transform* T_camera_local, __global const uint4* surfels, int4 block, uint first) {
-  __global const uint* words = (__global const uint*)(surfels + first);
-  const uint16 a = vload16(0, words), b = vload16(1, words), c = vload16(2, words), d = vload16(3, words);
-  const uint16 x = (uint16)(a.s048c, b.s048c, c.s048c, d.s048c), y = (uint16)(a.s159d, b.s159d, c.s159d, d.s159d);
-  Surfels s;
-  s.position.x = ((float)(block.x - window->origin_x) + (convert_float16(x & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
-  s.position.y = ((float)(block.y - window->origin_y) + (convert_float16(x >> 16) + 0.5f) / 65536.0f) * window->block_size;
-  s.position.z = ((float)(block.z - window->origin_z) + (convert_float16(y & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
-  s.position = transform_points(T_camera_local, s.position);
-  s.radius = as_float16(((y >> 16) << 13) + (112u << 23));
-  s.normal = (uint16)(a.s26ae, b.s26ae, c.s26ae, d.s26ae);
-  s.attributes = (uint16)(a.s37bf, b.s37bf, c.s37bf, d.s37bf);
-  return s;
-}
-
-// Their normals, camera frame.
-INLINE Points stored_normals(const Surfels* s, const Transform* T_camera_local) {
-  Points n = {convert_float16(as_int16(s->normal << 16) >> 16), convert_float16(as_int16(s->normal) >> 16), 0.0f};
-  n.z = 32767.0f - fabs(n.x) - fabs(n.y);
-  const float16 fold = fmax(-n.z, 0.0f);
-  n.x += n.x < 0.0f ? fold : -fold;
-  n.y += n.y < 0.0f ? fold : -fold;
-  return rotate_points(T_camera_local, normalized(n));
-}
-
-// Those that a measured surface would still tell something: that they are occupied, or their colour.
-INLINE int16 lacks_label(uint16 attributes, int has_color) {
-  const uint done = SURFEL_OCCUPIED | (has_color ? SURFEL_COLORED : 0);
-  return (attributes & done) != done;
-}
-
-// Bits of LANES slots in a word of their page.
+// Bits of LANES slots in the word of their page.
+//   first: the first of the slots
 INLINE uint lanes_of_page(ulong word, uint first) { return (uint)(word >> (first % PAGE_SLOTS)) & ((1u << LANES) - 1); }
 
-// The word whose parts are lanes[0 ... 3].
-INLINE ulong pack_lanes(__local const ushort* lanes) {
-  ulong bits = 0;
-  for (int n = 0; n < PAGE_ITEMS; ++n) bits |= (ulong)lanes[n] << (LANES * n);
-  return bits;
+// Surfels to which a measured surface would still tell something: that they are occupied, or their colour.
+INLINE intv lack_label(uintv attributes, int has_color) {
+  const uint done = SURFEL_OCCUPIED | (has_color ? SURFEL_COLORED : 0);
+  return MARK((attributes & done) != done);
 }

@@ -1,10 +1,10 @@
-// The pages of the map: where new surfels go, what a frame has changed, and pages for the host. The map is described in common/surfels.
+// The pages of the map: where new surfels go, what a frame has changed, and pages for the host. The map is described in common/surfels.cl.
 //
-// New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: the same on any
-// number of threads. For that they are sorted by cell (block of the window), the list's order kept in each.
+// New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: this does not
+// depend on the number of threads. For that they are sorted by cell (block of the window), and keep the list's order in each cell.
 
-// One work item a slot of a list of bits in pages: its number in the map.
-//   i/o list[count]: in: 64 n + bit for page pages[n]
+// One work item handles an entry of a list of bits in pages: it becomes a slot of the map.
+//   in  pages;   i/o list[count]: before: 64 n + bit for page pages[n]; after: slots
 __kernel void to_slots(__global const uint* pages, __global uint* list, const uint count) {
   const uint n = get_global_id(0);
   if (n < count) list[n] = PAGE_SLOTS * pages[list[n] / PAGE_SLOTS] + list[n] % PAGE_SLOTS;
@@ -12,8 +12,8 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
 
 INLINE uint chunk_begin(uint count, uint chunk) { return (uint)((ulong)count * chunk / SORT_CHUNKS); }
 
-// One work item a chunk of the new surfels.
-//   out histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell
+// One work item handles a chunk of the new surfels.
+//   in  new_cells[count];   out histogram[cells][SORT_CHUNKS]: how many of each chunk go to each cell
 __kernel void count_cells(__global const uint* new_cells, const uint count, const uint cells, __global uint* histogram) {
   const uint chunk = get_global_id(0);
   if (chunk >= SORT_CHUNKS) return;
@@ -21,8 +21,9 @@ __kernel void count_cells(__global const uint* new_cells, const uint count, cons
   for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
 }
 
-// One work item a chunk of the new surfels.
-//   i/o histogram: prefix sum before, then where each chunk's share of each cell ends;   out order[count]: new surfels sorted by cell
+// One work item handles a chunk of the new surfels.
+//   in  new_cells[count]
+//   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends;   out order[count]: new surfels sorted by cell
 __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __global uint* histogram, __global uint* order) {
   const uint chunk = get_global_id(0);
   if (chunk >= SORT_CHUNKS) return;
@@ -30,7 +31,7 @@ __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __g
     order[histogram[SORT_CHUNKS * new_cells[n] + chunk]++] = n;
 }
 
-// One work item a page.
+// One work item handles a page: it counts its free slots.
 //   in  pages[count]: of the window, by cell;   out free_slots[count]
 __kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global uint* free_slots) {
   const uint n = get_global_id(0);
@@ -40,10 +41,10 @@ __kernel void count_free(__global const uint* pages, const uint count, __global 
 // Pages that a block needs for new surfels in addition to its free slots.
 INLINE uint missing_pages(uint wanted, uint there) { return wanted > there ? (wanted - there + PAGE_SLOTS - 1) / PAGE_SLOTS : 0; }
 
-// One work item a cell, and one more: where its new surfels begin when sorted, and pages that its block needs in addition.
-//   in  histogram: its prefix sum, the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
-//       free_before: prefix sum of count_free's, the total behind it
-//   out cell_begin[cells + 1];  missing[cells]
+// One work item handles a cell, and one more the end.
+//   in  histogram: its prefix sum, with the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
+//       free_before: prefix sum of count_free's, with the total behind it
+//   out cell_begin[cells + 1]: where each cell's new surfels begin when sorted;  missing[cells]: pages that its block needs in addition
 __kernel void begin_cells(__global const uint* histogram, __global const uint* cell_pages, __global const uint* free_before,
                           const uint cells, __global uint* cell_begin, __global uint* missing) {
   const uint cell = get_global_id(0);
@@ -55,7 +56,7 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
   missing[cell] = missing_pages(wanted, there);
 }
 
-// One work item: all of the above for few new surfels, where launches take longer than the work.
+// One work item does all of the above for few new surfels, where launches take longer than that.
 __kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
                        __global const ulong* alive, __global const uint* cell_pages, const uint cells, __global uint* free_before,
                        __global uint* cell_begin, __global uint* missing, __global uint* order) {
@@ -79,10 +80,10 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
         missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
 }
 
-// One work item a page of the window: its free slots take their share of the cell's new surfels.
-//   in  pages[count], page_cells[count]: first those that begin_cells knows, by cell, then those that have been added for what these do not
-//       take; new_ranks: of such, its number among those of its cell
-//   i/o the map
+// One work item handles a page of the window: its free slots take their share of the cell's new surfels.
+//   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
+//       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
+//   i/o page_block, alive, changed, surfels: the map
 __kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
                          __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
@@ -106,9 +107,9 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
   changed[page] |= taken;
 }
 
-// One work item a page of the window.
-//   i/o changed: nothing has, for the next frame
-//   out page_block: frame of the last change;  changes[count]: this frame's;  empty[count]: 1 if nothing is left in it
+// One work item handles a page of the window at the end of a frame.
+//   in  pages[count], alive;   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
+//   out changes[count]: this frame's;  empty[count]: 1 if nothing is left in the page
 __kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
                            const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
   const uint n = get_global_id(0);
@@ -120,8 +121,8 @@ __kernel void finish_pages(__global const uint* pages, const uint count, __globa
   changed[page] = 0;
 }
 
-// One work item a slot of a list: its surfel, for the host.
-//   out blocks: block of each, w: 1 if it is alive
+// One work item handles a slot of a list: it copies its surfel for the host.
+//   in  slots[count];   out gathered[count];  blocks[count]: x, y, z of the surfel's block, w: 1 if it is alive
 __kernel void gather_surfels(__global const uint* slots, const uint count, __global const ulong* alive, __global const int4* page_block,
                              __global const uint4* surfels, __global uint4* gathered, __global int4* blocks) {
   const uint n = get_global_id(0);
@@ -131,7 +132,8 @@ __kernel void gather_surfels(__global const uint* slots, const uint count, __glo
   blocks[n] = (int4)(page_block[slot / PAGE_SLOTS].xyz, is_alive(alive, slot) ? 1 : 0);
 }
 
-// One work item a slot of a list of pages: the pages one after the other, for the host.
+// One work item handles a slot of a list of pages: it copies its surfel for the host, which gets the pages one after the other.
+//   in  pages[count];   out gathered[PAGE_SLOTS count]
 __kernel void gather_pages(__global const uint* pages, const uint count, __global const uint4* surfels, __global uint4* gathered) {
   const uint n = get_global_id(0);
   if (n < PAGE_SLOTS * count) gathered[n] = surfels[PAGE_SLOTS * pages[n / PAGE_SLOTS] + n % PAGE_SLOTS];

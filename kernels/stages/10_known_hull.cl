@@ -2,7 +2,7 @@
 //
 // Six images of keys, one after the other: faces i low, i high [size_j][size_k], j low, j high [size_i][size_k], k low, k high
 // [size_j][size_i]. A key is the surfel's distance from the face (bits of a positive float, which sort like the number) with the state in
-// its lowest bit: the smallest key is the nearest surfel, and an unknown one wins a tie. HULL_EMPTY: no surfel.
+// its lowest bit: the smallest key is the nearest surfel, and an unknown one wins a tie. HULL_EMPTY means no surfel.
 
 #define HULL_EMPTY 0xffffffffu
 
@@ -29,9 +29,10 @@ INLINE uint face_offset(const Grid* g, int face) {
   return face_start(face, g->size_j * g->size_k, g->size_i * g->size_k, g->size_i * g->size_j);
 }
 
-// Enters a surfel into the cells of an ellipse in a face, those on paths to be walked (and their neighbours).
+// Enters a surfel into the cells of an ellipse in a face, as far as they are on paths to be walked or beside them.
 //   center, axes: of the ellipse, in the face's coordinates (column, row);  width, height: cells of the face
-//   lines: of the face's first row;  along_k: columns are layers, a bit each, else a number each;  row_lines: from row to row
+//   lines: those of the face's first row;  along_k: whether columns are layers, which have a bit each in lines, else a number each;
+//   row_lines: numbers from one row of lines to the next
 INLINE void stamp_face(__global uint* face, int width, int height, float2 center, float2 axes, uint key, __global const uint* lines,
                        bool along_k, int row_lines) {
   const float2 half_axes = fmax(axes, 0.5f);
@@ -84,28 +85,31 @@ INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfe
                axes.xy * (key_k & 1 ? 1.0f : unknown), key_k, lines + lines_k(&g, 0, 0), false, g.size_i);
 }
 
-// One work item LANES slots of a list of pages: surfels beyond a face, and within its range in the other two coordinates (with their own
-// reach as a margin), enter it.
-//   in  lines: of 5_recent_views;   i/o faces: six images of keys, HULL_EMPTY before; right on the paths to be walked
+// One work item handles LANES surfels of a page: those beyond a face, and within its range in the other two coordinates (with their own reach
+// as a margin), enter it. Work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
+//   in  pages[count];  alive, page_block, surfels: the map;  lines: of 8_needed_paths
+//   i/o faces: six images of keys, HULL_EMPTY before; they are right on the paths to be walked
 __kernel void project_hull(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
                            __global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
                            __global const uint4* surfels, __global const uint* lines, __global uint* faces) {
-  const uint item = get_global_id(0);
-  if (item >= PAGE_SLOTS / LANES * count) return;
-  const uint page = pages[item / (PAGE_SLOTS / LANES)], first = PAGE_SLOTS * page + LANES * (item % (PAGE_SLOTS / LANES));
+  const uint n = get_global_id(0) / PAGE_ITEMS;
+  if (n >= count) return;
+  const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page], first);
   if (lanes == 0) return;
-  const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
+  Surfels s = load_surfels(&window, surfels, page_block[page], first);
+  s.position = transformed(&T_camera_local, s.position);
   const Voxels at = voxels_at(&g, s.position);
-  const int16 reach = convert_int16(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.position.z, g.z_min)) + 2;
-  const int16 near_i = (at.i >= -reach) & (at.i < g.size_i + reach), near_j = (at.j >= -reach) & (at.j < g.size_j + reach);
-  const int16 near_k = (at.k >= -reach) & (at.k < g.size_k + reach);
-  const int16 beyond = (((at.i < 0) | (at.i >= g.size_i)) & near_j & near_k) | (((at.j < 0) | (at.j >= g.size_j)) & near_i & near_k) |
-                       (((at.k < 0) | (at.k >= g.size_k)) & near_i & near_j);
-  for (uint left = lanes & lane_bits(beyond); left != 0; left &= left - 1) {
-    const ViewSurfel v = place_slot(&g, &window, &T_camera_local, surfels, page_block, first + lowest_lane(left));
-    enter_surfel(&g, &limits, &v, lines, faces);
-  }
+  const intv reach = convert_intv(2.0f * limits.hull_unknown_scale * s.radius * g.f / fmax(s.position.z, g.z_min)) + 2;
+  const intv near_i = MARK((at.i >= -reach) & (at.i < g.size_i + reach)), near_j = MARK((at.j >= -reach) & (at.j < g.size_j + reach)),
+             near_k = MARK((at.k >= -reach) & (at.k < g.size_k + reach));
+  const intv beyond_i = MARK((at.i < 0) | (at.i >= g.size_i)), beyond_j = MARK((at.j < 0) | (at.j >= g.size_j)),
+             beyond_k = MARK((at.k < 0) | (at.k >= g.size_k));
+  uint left = lanes & lane_bits((beyond_i & near_j & near_k) | (beyond_j & near_i & near_k) | (beyond_k & near_i & near_j));
+  if (left == 0) return;
+  ViewSurfel placed[LANES];
+  place_in_view(&g, &s, rotated(&T_camera_local, unpack_normals(s.normal)), first + as_uintv(lane_numbers()), placed);
+  for (; left != 0; left &= left - 1) enter_surfel(&g, &limits, &placed[lowest_lane(left)], lines, faces);
 }
 
 // Is the state of a cell known? Not if no surfel was met there or beside it.
@@ -124,8 +128,8 @@ INLINE uint hull_word_offset(const Grid* g, int face) {
   return face_start(face, g->size_j * g->words_k, g->size_i * g->words_k, g->size_i * g->size_j);
 }
 
-// One work item a word of the hull; dimension 1 is the face.
-//   out hull: bits as hull_word_offset says, 1 = known
+// One work item handles a word of the hull: of face get_global_id(1).
+//   in  faces: of project_hull;   out hull: words as hull_word_offset says, 1 = known
 __kernel void hull_states(const Grid g, __global const uint* faces, __global ulong* hull) {
   const int word = get_global_id(0), face = get_global_id(1);
   __global const uint* image = faces + face_offset(&g, face);

@@ -1,8 +1,10 @@
-// Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family.
+// Sweeps - paper 3.2, Algorithm 1: the state e of each path, walked forward and backward, along each family, gives K'.
 //
-// At each voxel, in this order: invalid or exit -> e = 0; K' |= e; enter (and not invalid) -> e = 1. Along i and j one word carries 64
-// paths. events: bit fields [3][EVENT_PLANES] of 9_sign_field; hull: 10_known_hull; lines: 5_recent_views: paths without a bit there are not
-// walked.
+// At each voxel, in this order: if it is invalid or an exit, e = 0; K' |= e; if it is an entry and not invalid, e = 1. Along i and j one word
+// carries 64 paths.
+//   in  events[3][EVENT_PLANES]: bit fields of 9_sign_field;  hull: of 10_known_hull: states in which paths enter the grid
+//       lines: of 8_needed_paths: other paths are not walked
+//   i/o known: bit field K'
 
 INLINE bool is_needed(__global const uint* lines, int word) { return (lines[word] | lines[word + 1]) != 0; }
 
@@ -28,7 +30,7 @@ void sweep_words(__global const ulong* events, size_t plane, int first, int stri
     known[at] |= step_paths(&e, events[EVENT_ENTER_BACKWARD * plane + at], events[EVENT_EXIT_BACKWARD * plane + at], invalid[at]);
 }
 
-// One work item a word (j, w) of the i faces. First of the three: it sets known, the others add to it.
+// One work item handles a word (j, w) of the i faces. This kernel runs first: it sets known, and the others add to it.
 __kernel void sweep_i(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);
@@ -38,7 +40,7 @@ __kernel void sweep_i(const Grid g, __global const uint* lines, __global const u
               hull[hull_word_offset(&g, FACE_I_HIGH) + path], known, true);
 }
 
-// One work item a word (i, w) of the j faces.
+// One work item handles a word (i, w) of the j faces.
 __kernel void sweep_j(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);
@@ -86,7 +88,7 @@ INLINE ulong walk_down(bool* e, ulong enter, ulong exit, ulong invalid) {
   return known;
 }
 
-// One work item a path (i, j).
+// One work item handles a path (i, j).
 __kernel void sweep_k(const Grid g, __global const uint* lines, __global const ulong* events, __global const ulong* hull,
                       __global ulong* known) {
   const int path = get_global_id(0);

@@ -1,4 +1,4 @@
-// Median - paper eq. (8): K~(v) = 1 iff enough of the 27 voxels around v have K' = 1. Beyond the grid its border repeats.
+// Median - paper 3.2, eq. (8): K~(v) = 1 iff at least median_votes of the 27 voxels around v have K' = 1. Beyond the grid its border repeats.
 
 // A word's bits moved so that bit k holds what layer k + 1, k - 1 has.
 INLINE ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int w) {
@@ -14,8 +14,9 @@ INLINE ulong layer_below(const Grid* g, __global const ulong* field, int i, int 
   return (here << 1) | (w > 0 ? field[word_index(g, i, j, w - 1)] >> 63 : here & 1);
 }
 
-// One work item a word: 64 counts at once, bit n of a count in plane n.
-//   in  known: K', zero beyond the last layer;  candidates: in words without one K~ is 0, as nobody asks;   out filtered: K~
+// One work item handles a word, in word_index's order: 64 counts at once, bit n of each count in plane n.
+//   in  known: bit field K', zero beyond the last layer;  candidates: bit field by tiles: where a word has none, nobody asks for K~
+//   out filtered: bit field K~, 0 in words without a candidate
 __kernel void median(const Grid g, const Limits limits, __global const ulong* known, __global const ulong* candidates,
                      __global ulong* filtered) {
   const int word = get_global_id(0);

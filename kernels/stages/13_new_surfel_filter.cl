@@ -1,21 +1,22 @@
 // New surfel filter - paper 3.5: candidates that are known, or whose directions cancel, make no surfel.
 
-// New surfel filter. One work item a chunk of LANES listed candidates: those that are known, or whose directions cancel, make no surfel.
-//   in  voxels, directions: of find_directions;  candidates: those that close_gaps has left, as 32-bit halves;  known: K~, where it has
-//       been computed
-//   out kept[words]: a bit for each that makes one, as 16-bit quarters
+// One work item handles a chunk of LANES listed candidates; there are work items for whole words of 64.
+//   in  voxels[count], directions: of find_directions;  candidates: bit field by tiles, as 32-bit halves: those that close_gaps has left
+//       known: bit field K~, as 32-bit halves, if has_known
+//   out kept[(count + 63) / 64 words]: a bit for each listed candidate that makes a surfel, as 32-bit halves; at width 1 zero before
 __kernel void filter_candidates(const Grid g, const Limits limits, __global const int* voxels, const int count,
                                 __global const float* directions, __global const int* candidates, const int has_known,
-                                __global const int* known, __global ushort* kept) {
+                                __global const int* known, __global uint* kept) {
   const int chunk = get_global_id(0);
-  if (chunk * LANES >= count) {
-    if (chunk < 64 / LANES * ((count + 63) / 64)) kept[chunk] = 0;  // the rest of the last word
-    return;
+  if (chunk >= (count + 63) / 64 * (64 / LANES)) return;
+  uint open_bits = 0;
+  if (chunk * LANES < count) {
+    intv exist;
+    const intv numbers = load_chunk(voxels, count, chunk, &exist), bit = half_bits(numbers);
+    intv open = exist & MARK((gather_int(candidates, numbers / 32) & bit) != 0) &
+                MARK(lengths(load_directions(directions, chunk)) >= limits.normal_min);
+    if (has_known) open &= MARK((gather_int(known, voxel_halves(&g, voxels_of(&g, numbers))) & bit) == 0);
+    open_bits = lane_bits(open);
   }
-  int16 exist;
-  const int16 numbers = load_chunk(voxels, count, chunk, &exist), at = numbers / 32, bit = (int16)(1) << numbers % 32;
-  const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
-  int16 open = exist & ((gather_int(candidates, at) & bit) != 0) & (lengths(direction) >= limits.normal_min);
-  if (has_known) open &= (gather_int(known, voxel_halves(&g, voxels_of(&g, numbers))) & bit) == 0;
-  kept[chunk] = (ushort)lane_bits(open);
+  store_lane_bits(open_bits, chunk, kept);
 }

@@ -1,6 +1,7 @@
-// Removal - paper 3.4, eq. (12) - of what 3_visit has decided on.
+// Removal - paper 3.4, eq. (12) - of the surfels that 3_visit has decided on.
 
-// One work item a page of the window: slots of removed surfels become free.
+// One work item handles a page of the window: slots of removed surfels become free.
+//   in  pages[count], removed[count]: a bit for each surfel of the page;   i/o alive, changed: of the map
 __kernel void remove_surfels(__global const uint* pages, const uint count, __global const ulong* removed, __global ulong* alive,
                              __global ulong* changed) {
   const uint n = get_global_id(0);

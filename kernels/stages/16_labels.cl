@@ -1,8 +1,10 @@
 // Labels and colour - paper 3.5: a surfel where a column of observed voxels ends at a measured surface is occupied, for ever.
 
-// One work item LANES surfels of a page of the window: those that are new, and those that 3_visit has found at a surface.
+// One work item handles LANES surfels of a page of the window, those of them that are new and those that 3_visit has found at a surface;
+// work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
 //   in  changed: which surfels they are;  depth, column_end: of 1_observed_space
 //       color[height][width]: red | green << 8 | blue << 16, if has_color
+//   i/o surfels: their attributes
 __kernel void label_surfels(const Grid g, const Limits limits, const Window window, const Transform T_camera_local,
                             __global const float* depth, __global const int* column_end, __global const uint* color, const int has_color,
                             __global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
@@ -12,13 +14,14 @@ __kernel void label_surfels(const Grid g, const Limits limits, const Window wind
   const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page] & changed[page], first);
   if (lanes == 0) return;
-  const Surfels s = load_surfels(&window, &T_camera_local, surfels, page_block[page], first);
-  const Voxels v = voxels_at(&g, s.position);
-  const int16 unlabelled = inside_grid16(&g, v) & lacks_label(s.attributes, has_color);
-  int16 at;
-  const int16 labelled = at_surface(&g, depth, column_end, limits.surface_depth, v, s.position.z, unlabelled, &at);
+  const Surfels s = load_surfels(&window, surfels, page_block[page], first);
+  const Points position = transformed(&T_camera_local, s.position);
+  const Voxels v = voxels_at(&g, position);
+  const intv unlabelled = inside_grid(&g, v) & lack_label(s.attributes, has_color);
+  intv at;
+  const intv labelled = at_surface(&g, depth, column_end, limits.surface_depth, v, position.z, unlabelled, &at);
   int pixel[LANES];
-  vstore16(at, 0, pixel);
+  vstorev(at, 0, pixel);
   for (uint left = lanes & lane_bits(labelled); left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     uint attributes = surfels[first + m].w | SURFEL_OCCUPIED;

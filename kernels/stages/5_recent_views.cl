@@ -1,23 +1,24 @@
 // Recent views: our addition to the paper. A candidate whose centre a kept view has seen is known: no surfel there.
+//
+// A tile's candidates are listed, and kept views asked of all of them, LANES at once; a candidate that one knows is settled. The views that
+// know some of a few probes are asked first, as they settle most. What is left has a box, and the other views that may know something of
+// that box are asked; 7_thin_gaps and 15_creation ask the same ones.
 
-// So many views are asked at first before the candidates left are listed anew.
-#define FIRST_VIEWS 6
-
-// So many of a tile's candidates show which views should be asked first.
-#define PROBES 2
+#define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
+#define TILE_CHUNKS (TILE_ENTRIES / LANES)
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
-  ulong words[TILE_COLUMNS];                           // candidates
-  ulong layers;                                        // that have one in any column
-  ushort entries[TILE_COLUMNS * VIEW_TILE_K + LANES];  // the tile's candidates, VIEW_TILE_K column + layer
+  ulong words[TILE_COLUMNS];                // candidates
+  ulong layers;                             // that have one in any column
+  ushort entries[TILE_ENTRIES + LANES];     // the tile's candidates, VIEW_TILE_K column + layer
   uint entry_count;
-  float centers[TILE_COLUMNS][3][LANES];  // of the entries, by chunk
-  ushort open[TILE_COLUMNS];              // entries that are not settled, a bit each, by chunk
-  ushort chunks[TILE_COLUMNS];            // that have such: work item n's are chunks[n], chunks[n + work items] ...
-  ushort views[MOST_VIEWS];               // to be asked, in this order
+  float centers[TILE_CHUNKS][3][LANES];     // of the entries: x, y, z of each chunk
+  ushort open[TILE_CHUNKS];                 // entries of each chunk that are not settled, a bit each
+  ushort chunks[TILE_CHUNKS];               // that have such: work item n's are chunks[n], chunks[n + work items] ...
+  ushort views[MOST_VIEWS];                 // to be asked, in this order
   uint view_count;
-  uint likely_views;  // those of the first LANES that have been asked because of the probes, a bit each
+  uint likely_views;                        // of the first group: those asked because of the probes, a bit each
 } Tile;
 
 INLINE ulong all_bits(ulong8 words) {
@@ -26,12 +27,12 @@ INLINE ulong all_bits(ulong8 words) {
   return of_2.x | of_2.y;
 }
 
-// Loads the words of tiles one above the other.
+// Loads the words of the tiles one above the other.
 INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
-  for (int row = lane; row < VIEW_TILE; row += lanes) vstore8(vload8(row, candidates), row, own->words);
+  const int item = get_local_id(0), items = get_local_size(0);
+  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, candidates), row, own->words);
   barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0) {
+  if (item == 0) {
     ulong8 words = 0;
     for (int row = 0; row < VIEW_TILE; ++row) words |= vload8(row, own->words);
     own->layers = all_bits(words);
@@ -41,7 +42,7 @@ INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
 
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
 
-// Lists a tile's candidates. One work item does it, and so the next ones.
+// Lists a tile's candidates. One work item does this, and what the next two functions do.
 INLINE void list_entries(__local Tile* own, int3 tile) {
   uint count = 0;
   for (int column = 0; column < TILE_COLUMNS; ++column)
@@ -86,40 +87,45 @@ INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 til
                   corner + 31 - (int3)((int)clz(columns), (int)clz(rows), (int)clz(layers)), min_gap);
 }
 
+// The centre of a tile's entry, camera frame.
+INLINE float3 entry_center(const Grid* g, int3 tile, __global const float* layer_depth, int entry) {
+  const int column = entry / VIEW_TILE_K;
+  const float z = layer_depth[tile.z * VIEW_TILE_K + entry % VIEW_TILE_K], depth = fmax(z, g->z_min);
+  return (float3)(((float)(tile.x * VIEW_TILE + column % VIEW_TILE) - g->center_i) * depth / g->fx,
+                  ((float)(tile.y * VIEW_TILE + column / VIEW_TILE) - g->center_j) * depth / g->fy, z);
+}
+
 // How many of PROBES candidates of a tile each of LANES views knows, but for rounding: it decides who is asked first, no more.
-INLINE int16 count_known(const Grid* g, int3 tile, __global const float* layer_depth, __global const float* lanes,
-                         __global const ushort* depths, float depth_step, __local const Tile* own) {
-  const float16 r00 = vload16(0, lanes), r01 = vload16(1, lanes), r02 = vload16(2, lanes);
-  const float16 r10 = vload16(3, lanes), r11 = vload16(4, lanes), r12 = vload16(5, lanes);
-  const float16 r20 = vload16(6, lanes), r21 = vload16(7, lanes), r22 = vload16(8, lanes);
-  const float16 t0 = vload16(9, lanes), t1 = vload16(10, lanes), t2 = vload16(11, lanes);
-  const float16 fx = vload16(12, lanes), fy = vload16(13, lanes), cx = vload16(14, lanes) + 0.5f, cy = vload16(15, lanes) + 0.5f;
-  const float16 width = vload16(16, lanes), height = vload16(17, lanes);
-  const uint16 first_pixel = as_uint16(vload16(18, lanes));
-  int16 counts = 0;
+INLINE intv count_known(const Grid* g, int3 tile, __global const float* layer_depth, const ViewLanes* v, __global const ushort* depths,
+                        float depth_step, __local const Tile* own) {
+  intv counts = 0;
   for (int n = 0; n < PROBES; ++n) {
-    const int entry = own->entries[(own->entry_count - 1) * n / (PROBES - 1)], column = entry / VIEW_TILE_K;
-    const float z = layer_depth[tile.z * VIEW_TILE_K + entry % VIEW_TILE_K], width_there = fmax(z, g->z_min);
-    const float x = ((float)(tile.x * VIEW_TILE + column % VIEW_TILE) - g->center_i) * width_there / g->fx,
-                y = ((float)(tile.y * VIEW_TILE + column / VIEW_TILE) - g->center_j) * width_there / g->fy;
-    const float16 depth = r20 * x + r21 * y + r22 * z + t2, scale = 1.0f / depth;
-    const float16 s = (r00 * x + r01 * y + r02 * z + t0) * fx * scale + cx, t = (r10 * x + r11 * y + r12 * z + t1) * fy * scale + cy;
-    const int16 seen = (depth > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < width) & (t < height);
-    const uint16 pixel = first_pixel + view_pixels(convert_uint16(width), convert_uint16(s), convert_uint16(t));
-    counts -= seen & (depth < view_depths(depths, seen ? as_int16(pixel) : 0, depth_step));
+    const int entry = own->entries[(own->entry_count - 1) * n / (PROBES - 1)];
+    const Points p = point_in_views(v, entry_center(g, tile, layer_depth, entry));
+    const floatv scale = 1.0f / p.z, s = p.x * v->fx * scale + v->cx, t = p.y * v->fy * scale + v->cy;
+    const intv seen = MARK((p.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < v->width) & (t < v->height));
+    const uintv pixel = v->first_pixel + view_pixels(convert_uintv(v->width), convert_uintv(s), convert_uintv(t));
+    counts -= seen & MARK(p.z < view_depths(depths, seen ? as_intv(pixel) : 0, depth_step));
   }
   return counts;
 }
 
-// Lists those of the first LANES views that know some of the probes, those that know most first.
+// Lists those views of the first group that know some of the probes, those that know most first.
 INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views,
-                              __global const float* lanes, __global const ushort* depths, __local Tile* own) {
-  const int16 counts = count_known(g, tile, layer_depth, lanes, depths, views->depth_step, own);
+                              __global const float* view_lanes, __global const ushort* depths, __local Tile* own) {
+  uint known_by[PROBES + 1] = {0};  // views that know so many probes, a bit each
+  for (int part = 0; part < VIEW_PARTS; ++part) {
+    const ViewLanes lanes = load_view_lanes(view_lanes, part);
+    const intv counts = count_known(g, tile, layer_depth, &lanes, depths, views->depth_step, own);
+    for (int known = 1; known <= PROBES; ++known) known_by[known] |= lane_bits(MARK(counts == known)) << (part * LANES);
+  }
   uint count = 0;
-  for (int known = PROBES; known > 0; --known)
-    for (uint left = lane_bits(counts == known); left != 0; left &= left - 1) own->views[count++] = (ushort)lowest_lane(left);
+  own->likely_views = 0;
+  for (int known = PROBES; known > 0; --known) {
+    for (uint left = known_by[known]; left != 0; left &= left - 1) own->views[count++] = (ushort)lowest_lane(left);
+    own->likely_views |= known_by[known];
+  }
   own->view_count = count;
-  own->likely_views = lane_bits(counts > 0);
 }
 
 // Lists the others that may know something near a tile's candidates.
@@ -128,26 +134,26 @@ INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int
   for (int group = 0; group < view_groups; ++group) {
     uint left = tile_views[group];
     if (group == 0) left &= ~own->likely_views;
-    for (; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * LANES + lowest_lane(left));
+    for (; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * VIEW_GROUP + lowest_lane(left));
   }
   own->view_count = count;
 }
 
 // Makes a work item's chunks of the entries; returns how many there are.
 INLINE uint open_chunks(const Grid* g, int3 tile, __global const float* layer_depth, __local Tile* own) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), entries = own->entry_count;
+  const int item = get_local_id(0), items = get_local_size(0), entries = own->entry_count;
   uint count = 0;
-  for (int chunk = lane; chunk * LANES < entries; chunk += lanes) {
-    const int16 exist = lane_numbers() < entries - chunk * LANES;
-    const int16 candidate = exist ? convert_int16(vload16(chunk, own->entries)) : 0, column = candidate / VIEW_TILE_K;
+  for (int chunk = item; chunk * LANES < entries; chunk += items) {
+    const intv exist = MARK(lane_numbers() < entries - chunk * LANES);
+    const intv candidate = exist ? convert_intv(vloadv(chunk, own->entries)) : 0, column = candidate / VIEW_TILE_K;
     const Voxels v = {tile.x * VIEW_TILE + column % VIEW_TILE, tile.y * VIEW_TILE + column / VIEW_TILE,
                       tile.z * VIEW_TILE_K + candidate % VIEW_TILE_K};
     const Points center = voxel_centers(g, layer_depth, v);
-    vstore16(center.x, 0, own->centers[chunk][0]);
-    vstore16(center.y, 0, own->centers[chunk][1]);
-    vstore16(center.z, 0, own->centers[chunk][2]);
+    vstorev(center.x, 0, own->centers[chunk][0]);
+    vstorev(center.y, 0, own->centers[chunk][1]);
+    vstorev(center.z, 0, own->centers[chunk][2]);
     own->open[chunk] = (ushort)lane_bits(exist);
-    own->chunks[count++ * lanes + lane] = (ushort)chunk;
+    own->chunks[count++ * items + item] = (ushort)chunk;
   }
   return count;
 }
@@ -155,15 +161,15 @@ INLINE uint open_chunks(const Grid* g, int3 tile, __global const float* layer_de
 // Asks a view of all chunks of a work item, one after the other: what is asked of one does not wait for another, and no branch has to be
 // guessed. Returns how many have entries left.
 INLINE uint ask_view(const View* view, __global const ushort* depths, uint chunks, __local Tile* own) {
-  const int lane = get_local_id(0), lanes = get_local_size(0);
+  const int item = get_local_id(0), items = get_local_size(0);
   uint left = 0;
   for (uint n = 0; n < chunks; ++n) {
-    const int chunk = own->chunks[n * lanes + lane];
-    const Points center = {vload16(0, own->centers[chunk][0]), vload16(0, own->centers[chunk][1]), vload16(0, own->centers[chunk][2])};
-    const int16 open = lane_marks(own->open[chunk]);
+    const int chunk = own->chunks[n * items + item];
+    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
+    const intv open = lane_marks(own->open[chunk]);
     const uint still = lane_bits(open & ~knows(view, depths, center, open));
     own->open[chunk] = (ushort)still;
-    own->chunks[left * lanes + lane] = (ushort)chunk;
+    own->chunks[left * items + item] = (ushort)chunk;
     left += still != 0 ? 1 : 0;
   }
   return left;
@@ -186,16 +192,17 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
   }
 }
 
-// One work-group VIEW_TILE x VIEW_TILE columns and a word's layers: 64 / VIEW_TILE_K tiles, each of VIEW_TILE_K layers.
-//   in  views[view_count];  view_lanes: the same, by lanes;  depths: their images, and the largest depth of each block of them;
-//       layer_depth[size_k]
-//   out tile_views[tiles][groups of LANES views]: of tiles with candidates left: a bit for each view that may know something near them
-//   i/o candidates: those that a view knows are cleared
+// One work-group has the tiles of a word of VIEW_TILE x VIEW_TILE columns, 64 / VIEW_TILE_K tiles one above the other: group
+// (tile_j words_k + w) tiles_i + tile_i.
+//   in  views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
+//   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
+//       near them
+//   i/o candidates: bit field by tiles: those that a view knows are cleared
 __kernel void settle_candidates(const Grid g, const float min_gap, __global const View* views, __global const float* view_lanes,
                                 const int view_count, __global const ushort* depths, __global const float* layer_depth,
                                 __global ushort* tile_views, __global ulong* candidates) {
-  const int lane = get_local_id(0), lanes = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
-            view_groups = (view_count + LANES - 1) / LANES;
+  const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
+            view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
   const int group = get_group_id(0), tiles_i = grid_tiles(g.size_i);
   __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
   __local Tile own;
@@ -205,28 +212,28 @@ __kernel void settle_candidates(const Grid g, const float min_gap, __global cons
   int3 tile = (int3)(group % tiles_i, group / tiles_i / g.words_k, group / tiles_i % g.words_k * tiles_of_word);
   for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
     if (tile_layers(own.layers, tile) == 0) continue;
-    if (lane == 0) {
+    if (item == 0) {
       list_entries(&own, tile);
       list_likely_views(&g, tile, layer_depth, views, view_lanes, depths, &own);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&g, tile, layer_depth, views, depths, &own);
     if (own.entry_count != 0) {
-      if (lane == 0) keep_entries(&own, tile);
+      if (item == 0) keep_entries(&own, tile);
       barrier(CLK_LOCAL_MEM_FENCE);
       Box box;
       find_candidates_box(&g, &own, tile, layer_depth, min_gap, &box);
       __global ushort* own_views = tile_views + ((tile.y * g.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
-      for (int n = lane; n < view_groups; n += lanes)
-        own_views[n] = (ushort)views_of_box(view_lanes + n * VIEW_LANE_FIELDS * LANES, views + n * LANES, depths, &box);
+      for (int n = item; n < view_groups; n += items)
+        own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, &box);
       barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-      if (lane == 0) list_views(&own, own_views, view_groups);
+      if (item == 0) list_views(&own, own_views, view_groups);
       barrier(CLK_LOCAL_MEM_FENCE);
       ask_views(&g, tile, layer_depth, views, depths, &own);
     }
-    if (lane == 0) keep_entries(&own, tile);
+    if (item == 0) keep_entries(&own, tile);
     barrier(CLK_LOCAL_MEM_FENCE);
   }
 
-  for (int row = lane; row < VIEW_TILE; row += lanes) vstore8(vload8(row, own.words), row, own_candidates);
+  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, own.words), row, own_candidates);
 }

@@ -1,7 +1,7 @@
-// Thin gaps: our addition to the paper. Frontier on a sheet of unknown thinner than min_gap, known on both sides, bounds nothing worth a
-// look: left out. A thin body's surfaces stay.
+// Thin gaps: our addition to the paper. Frontier on a sheet of unknown that is thinner than min_gap and known on both sides bounds nothing
+// worth a look, so it is left out. Surfaces of thin bodies stay.
 
-// The kept views that may know something near LANES candidates: those of the tiles that they are in.
+// The kept views that may know something near LANES candidates: those of the tiles that the candidates are in.
 typedef struct {
   __global const View* views;
   __global const ushort* tile_views;
@@ -17,7 +17,7 @@ INLINE void find_views_around(const Grid* g, __global const View* views, __globa
   around->tile_count = 0;
   const int tiles_i = grid_tiles(g->size_i), tiles_k = 64 / VIEW_TILE_K * g->words_k;
   int tiles[LANES];
-  vstore16((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
+  vstorev((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
   for (int n = 0; n < LANES; ++n) {
     bool is_new = true;
     for (int m = 0; m < around->tile_count; ++m) is_new = is_new && around->tiles[m] != tiles[n];
@@ -25,47 +25,47 @@ INLINE void find_views_around(const Grid* g, __global const View* views, __globa
   }
 }
 
-// Which of LANES points of this frame's camera, near candidates, does a kept view know?
-int16 any_view_knows(const ViewsAround* around, __global const ushort* depths, Points p, int16 asked) {
-  int16 open = asked;
+// Which of LANES points near the candidates does a kept view know?
+//   p: camera frame;  asked: marks of the points in question
+intv any_view_knows(const ViewsAround* around, __global const ushort* depths, Points p, intv asked) {
+  intv open = asked;
   for (int group = 0; group < around->view_groups; ++group) {
     uint left = 0;
     for (int n = 0; n < around->tile_count; ++n) left |= around->tile_views[around->tiles[n] * around->view_groups + group];
     for (; left != 0; left &= left - 1) {
-      const View view = around->views[group * LANES + lowest_lane(left)];
+      const View view = around->views[group * VIEW_GROUP + lowest_lane(left)];
       open &= ~knows(&view, depths, p, asked);
-      if (lane_bits(open) == 0) return asked;
+      if (!any_lane(open)) return asked;
     }
   }
   return asked & ~open;
 }
 
-// One work item a chunk of LANES listed candidates.
+// One work item handles a chunk of LANES listed candidates.
 //   in  depth, column_end: of 1_observed_space;  view: this frame's, views: the kept ones, both in this frame's camera;  tile_views: of
-//       settle_candidates;  depths: their images;  voxels, directions: of find_directions
-//   i/o candidates: those with known space again `min_gap` behind them are cleared; 32-bit halves
+//       settle_candidates;  depths: their images;  voxels[count], directions: of find_directions
+//   i/o candidates: bit field by tiles, as 32-bit halves: those with known space again `min_gap` behind them are cleared
 __kernel void close_gaps(const Grid g, const Limits limits, const View view, __global const View* views, __global const ushort* tile_views,
                          const int view_groups, __global const ushort* depths, __global const float* layer_depth,
                          __global const float* depth, __global const int* column_end, __global const int* voxels, const int count,
                          __global const float* directions, __global uint* candidates) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
-  int16 exist;
-  const int16 numbers = load_chunk(voxels, count, chunk, &exist);
+  intv exist;
+  const intv numbers = load_chunk(voxels, count, chunk, &exist);
   const Voxels v = voxels_of(&g, numbers);
-  const Points center = voxel_centers(&g, layer_depth, v);
-  const Points direction = {vload16(3 * chunk, directions), vload16(3 * chunk + 1, directions), vload16(3 * chunk + 2, directions)};
-  int16 pixel, open = exist & (lengths(direction) >= limits.normal_min);
+  const Points center = voxel_centers(&g, layer_depth, v), direction = load_directions(directions, chunk);
+  intv pixel, open = exist & MARK(lengths(direction) >= limits.normal_min);
   open &= ~at_surface(&g, depth, column_end, limits.surface_depth, v, center.z, open, &pixel);
-  const int16 asked = open;
-  if (lane_bits(open) == 0) return;
+  const intv asked = open;
+  if (!any_lane(open)) return;
   const Points behind = add_scaled(center, -limits.min_gap, normalized(direction));
   open &= ~own_view_knows(&view, depths, behind, open);
   ViewsAround around;
   find_views_around(&g, views, tile_views, view_groups, v, &around);
   open &= ~any_view_knows(&around, depths, behind, open);
   int closed[LANES];
-  vstore16(numbers, 0, closed);
+  vstorev(numbers, 0, closed);
   for (uint left = lane_bits(asked & ~open); left != 0; left &= left - 1) {
     const int number = closed[lowest_lane(left)];
     atomic_and(&candidates[number / 32], ~(1u << number % 32));

@@ -1,9 +1,8 @@
-// The paths that the paper's section 3.2 must walk: those near a candidate that the recent views have left open.
-
-// Paths that section 4 must still walk: those through the 27 voxels around a candidate, and their neighbours, which the hull looks at.
-// Three fields, one after the other: i paths [size_j][words_k] and j paths [size_i][words_k], a bit each along k; k paths [size_j][size_i],
-// a 32-bit number each.
-#define LINE_MARGIN 2
+// Needed paths: the paths that section 3.2 of the paper must walk are those near a candidate that the kept views have left open: through the
+// 27 voxels around it, which the median looks at, and beside these, where the hull looks.
+//
+// lines: three fields, one after the other: i paths [size_j][words_k] and j paths [size_i][words_k], a bit each along k, in words of two 32-bit
+// halves; k paths [size_j][size_i], a 32-bit number each that is not 0 if the path is needed.
 
 INLINE int lines_i(const Grid* g, int j, int w) { return 2 * (j * g->words_k + w); }
 INLINE int lines_j(const Grid* g, int i, int w) { return 2 * ((g->size_j + i) * g->words_k + w); }
@@ -15,15 +14,15 @@ INLINE void or_word(__global uint* lines, int at, ulong bits) {
   if (high != 0) atomic_or(&lines[at + 1], high);
 }
 
-// One work item a word.
-//   i/o lines: zero before
+// One work item handles a word of the bit fields, in word_index's order.
+//   in  candidates: bit field by tiles;   i/o lines: zero before
 __kernel void mark_lines(const Grid g, __global const ulong* candidates, __global uint* lines) {
   const int word = get_global_id(0);
   if (word >= g.size_i * g.size_j * g.words_k) return;
   const int i = word % g.size_i, w = word / g.size_i % g.words_k, j = word / g.size_i / g.words_k;
   const ulong open = candidates[tile_word_index(&g, i, j, w)];
   if (open == 0) return;
-  ulong below = 0, here = open, above = 0;  // the bits spread along k, into the words beside as well
+  ulong below = 0, here = open, above = 0;  // the bits spread along k, also into the words below and above
   for (int n = 1; n <= LINE_MARGIN; ++n) {
     here |= (open << n) | (open >> n);
     below |= open << (64 - n);

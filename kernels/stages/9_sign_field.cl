@@ -1,37 +1,48 @@
-// Inner product sign field D - supplement B - and the events that the sweeps will meet - Algorithm 1.
+// Inner product sign field D - paper 3.2, supplement B - and the events that the sweeps will meet - Algorithm 1.
 //
 // For a voxel at offset u (locally metric voxel coordinates) from a surfel with normal n, reach rho and thickness t:
 //   e^2 = (u.n)^2 / t^2 + |u - (u.n) n|^2 / rho^2,  weight w = 1 - e where e < 1;  g_tau = <n, t_tau>
 //   |g_tau| > th_d: D_tau += sign(g_tau) w;   else, where e < 1 and |u - (u.n) n| < rho / 2: the voxel is invalid for family tau.
 // Ours: a ragged surfel (15_creation) makes voxels invalid for every family.
-// One work-group does one tile in local memory: integers, so the order of surfels and the number of work items do not matter.
+// One work-group handles one tile in local memory. Its sums are integers, so the order of surfels and the number of work items do not matter.
 
-// p, n: camera frame
-INLINE ViewSurfel place_in_view(const Grid* g, float3 p, float3 n, float radius, uint attributes, uint slot) {
-  const float3 c = to_grid(g, p);
-  const bool pyramid = p.z >= g->z_min;
-  ViewSurfel s;
-  s.i = c.x;
-  s.j = c.y;
-  s.k = c.z;
-  s.reach = 2.0f * radius / voxel_size(g, p.z);
-  s.n_x = n.x;
-  s.n_y = n.y;
-  s.n_z = n.z;
-  s.n_k = pyramid ? dot(n, p) / length(p) : n.z;
-  s.ray_x = pyramid ? p.x / p.z : 0.0f;
-  s.ray_y = pyramid ? p.y / p.z : 0.0f;
-  s.slot = slot;
-  s.ragged = (attributes & SURFEL_RAGGED) != 0 ? 1 : 0;
-  return s;
+// Surfels as the view's grid sees them.
+//   s, normal: camera frame;   out placed[LANES]
+INLINE void place_in_view(const Grid* g, const Surfels* s, Points normal, uintv slots, ViewSurfel* placed) {
+  const Points p = s->position, c = to_grid(g, p);
+  const intv pyramid = MARK(p.z >= g->z_min);
+  float i[LANES], j[LANES], k[LANES], reach[LANES], n_x[LANES], n_y[LANES], n_z[LANES], n_k[LANES], ray_x[LANES], ray_y[LANES];
+  uint slot[LANES], ragged[LANES];
+  vstorev(c.x, 0, i);
+  vstorev(c.y, 0, j);
+  vstorev(c.z, 0, k);
+  vstorev(2.0f * s->radius / voxel_size(g, p.z), 0, reach);
+  vstorev(normal.x, 0, n_x);
+  vstorev(normal.y, 0, n_y);
+  vstorev(normal.z, 0, n_z);
+  vstorev(pyramid ? dot_products(normal, p) / lengths(p) : normal.z, 0, n_k);
+  vstorev(pyramid ? p.x / p.z : 0.0f, 0, ray_x);
+  vstorev(pyramid ? p.y / p.z : 0.0f, 0, ray_y);
+  vstorev(slots, 0, slot);
+  vstorev((s->attributes & SURFEL_RAGGED) != 0 ? (uintv)(1) : (uintv)(0), 0, ragged);
+  for (int n = 0; n < LANES; ++n)
+    placed[n] = (ViewSurfel){i[n], j[n], k[n], reach[n], n_x[n], n_y[n], n_z[n], n_k[n], ray_x[n], ray_y[n], slot[n], ragged[n]};
 }
 
-// A surfel of the map, placed.
-INLINE ViewSurfel place_slot(const Grid* g, const Window* window, const Transform* T_camera_local, __global const uint4* surfels,
-                             __global const int4* page_block, uint slot) {
-  const uint4 surfel = surfels[slot];
-  const float3 p = transform_point(T_camera_local, surfel_position(window, surfel, page_block[slot / PAGE_SLOTS]));
-  return place_in_view(g, p, rotate(T_camera_local, unpack_normal(surfel.z)), surfel_radius(surfel), surfel.w, slot);
+// One work item handles a chunk of LANES surfels in view.
+//   in  in_view_slots[count];  page_block, surfels: the map;   out view_surfels[count]
+__kernel void place_surfels(const Grid g, const Window window, const Transform T_camera_local, __global const int4* page_block,
+                            __global const uint4* surfels, __global const int* in_view_slots, const int count,
+                            __global ViewSurfel* view_surfels) {
+  const int chunk = get_global_id(0);
+  if (chunk * LANES >= count) return;
+  intv exist;
+  const uintv slots = as_uintv(load_chunk(in_view_slots, count, chunk, &exist));
+  Surfels s = surfels_at(&window, surfels, page_block, slots);
+  s.position = transformed(&T_camera_local, s.position);
+  ViewSurfel placed[LANES];
+  place_in_view(&g, &s, rotated(&T_camera_local, unpack_normals(s.normal)), slots, placed);
+  for (int n = 0; n < LANES && chunk * LANES + n < count; ++n) view_surfels[chunk * LANES + n] = placed[n];
 }
 
 // Half the length, along the functional (a_x, a_y, a_z), of the surfel's ellipsoid e < 1 - supplement B.
@@ -47,22 +58,14 @@ INLINE float3 ellipsoid_extents(const ViewSurfel* s, float thickness) {
                   ellipsoid_extent(s, thickness, (float3)(0.0f, 0.0f, 1.0f)));
 }
 
-// One work item a surfel in view, for the sign field.
-__kernel void place_surfels(const Grid g, const Window window, const Transform T_camera_local, __global const int4* page_block,
-                            __global const uint4* surfels, __global const uint* in_view_slots, const uint count,
-                            __global ViewSurfel* view_surfels) {
-  const uint n = get_global_id(0);
-  if (n < count) view_surfels[n] = place_slot(&g, &window, &T_camera_local, surfels, page_block, in_view_slots[n]);
-}
-
 #ifndef SIGN_FIELD_GROUP
-#define SIGN_FIELD_GROUP 64  // 1 on a CPU: no atomics then
+#define SIGN_FIELD_GROUP 64  // work items of a group; a CPU has 1, which needs no atomics
 #endif
 
 #define PADDED_K (TILE_K + 2)
 #define BEYOND 8  // a vector that begins in the last row may end behind it
 
-// The sign field of a tile, each family with one voxel more before and behind along its own paths.
+// The sign field of a tile. Each family has one voxel more before and behind the tile along its own paths.
 typedef struct {
   int i[(TILE_I + 2) * TILE_J * PADDED_K + BEYOND];
   int j[TILE_I * (TILE_J + 2) * PADDED_K + BEYOND];
@@ -123,7 +126,7 @@ bool tile_range(const Grid* g, const Limits* limits, const ViewSurfel* s, int3* 
 // Tiles along each axis; along k they fill whole words.
 int3 tiles_of(const Grid* g) { return (int3)((g->size_i - 1) / TILE_I + 1, (g->size_j - 1) / TILE_J + 1, g->words_k * (64 / TILE_K)); }
 
-// One work item a surfel in view: how many surfels touch each tile; tile (i, j, k) is number (k * tiles_j + j) * tiles_i + i.
+// One work item handles a surfel in view: it counts the surfels that touch each tile. Tile (i, j, k) has number (k tiles_j + j) tiles_i + i.
 //   i/o tile_counts[tiles], zero before
 __kernel void count_tiles(const Grid g, const Limits limits, __global const ViewSurfel* view_surfels, const uint count,
                           __global uint* tile_counts) {
@@ -138,8 +141,8 @@ __kernel void count_tiles(const Grid g, const Limits limits, __global const View
       for (int i = first.x; i <= last.x; ++i) atomic_inc(&tile_counts[(k * tiles.y + j) * tiles.x + i]);
 }
 
-// One work item a surfel in view: the surfels of each tile, in any order.
-//   i/o tile_cursor[tiles]: where the tile's list begins before, where it ends after
+// One work item handles a surfel in view: it enters it into the lists of tiles, in any order.
+//   i/o tile_cursor[tiles]: before: where the tile's list begins; after: where it ends
 //   out tile_surfels: indices into view_surfels
 __kernel void fill_tiles(const Grid g, const Limits limits, __global const ViewSurfel* view_surfels, const uint count,
                          __global uint* tile_cursor, __global uint* tile_surfels) {
@@ -253,7 +256,7 @@ INLINE void add_surfel(__local SignFieldTile* tile, __local const NeededPaths* n
 }
 
 // Events of one family in the voxels `touched` of a column whose values start at `here`; neighbours along the paths are `stride` away.
-// An extreme counts from the side it is walked from: its next value falls (rises). No event where the voxel is invalid.
+// A maximum counts for a walk if the next value on the walk is smaller, and a minimum if it is larger. Invalid voxels have no event.
 INLINE void write_events(__local const int* here, int stride, uint touched, uint invalid, int peak, __global uint* events, size_t plane) {
   uint enter_forward = 0, exit_forward = 0, enter_backward = 0, exit_backward = 0;
   for (ulong left = touched & ~invalid; left != 0; left &= left - 1) {
@@ -289,9 +292,9 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
   needed->any = any;
 }
 
-// One work-group a tile. Tiles without a path to be walked are left as they are.
-//   in  lines: of 5_recent_views;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
-//   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; right on the paths to be walked
+// One work-group handles a tile. Tiles without a path to be walked are left as they are.
+//   in  lines: of 8_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
+//   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; they are right on the paths to be walked
 __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(
     const Grid g, const Limits limits, __global const uint* lines, __global const ViewSurfel* view_surfels, __global const uint* tile_begin,
     __global const uint* tile_surfels, __global uint* events) {

@@ -1,4 +1,4 @@
-/// How a command of this package begins and ends.
+/// What the command-line programs share: usage, error messages and exit codes.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,8 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// Runs what reads the command line, and passes on what it throws; who asks for help, or is wrong, is shown the usage before.
+/// Runs `read`, which parses the command line, and rethrows what it throws. Prints the usage before: on standard output if help was asked
+/// for, on standard error after a mistake.
 template <typename Read>
 void read_arguments(const CLI::App& app, Read read) {
   try {
@@ -26,8 +27,9 @@ void read_arguments(const CLI::App& app, Read read) {
   }
 }
 
-/// Runs a command; what it throws becomes a sentence and an exit code.
-/// @param if_out_of_memory  what the user can do then
+/// Runs a command. Prints one sentence if it throws.
+/// @param if_out_of_memory  what the user is told to do when memory has run out
+/// @return the exit code
 template <typename Command>
 int run_command(const std::string& name, const std::string& if_out_of_memory, Command command) {
   try {

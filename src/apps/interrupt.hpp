@@ -1,12 +1,12 @@
-/// Ctrl-C asks a program to end with what it has done.
+/// Ctrl-C as a request to stop early and keep what has been done.
 #pragma once
 
 namespace frontier_surfels::replay {
 
-/// From now on the first Ctrl-C only asks to stop; the second ends the program at once.
+/// From now on the first Ctrl-C only requests a stop. The second one ends the program at once.
 void catch_first_interrupt();
 
-/// Whether it came.
+/// Whether Ctrl-C has been pressed.
 bool stop_requested();
 
 }  // namespace frontier_surfels::replay

@@ -1,4 +1,4 @@
-/// make_synthetic OUT: the demo's sequence, a furnished room seen on a walk around its table, as a folder of images and exact poses.
+/// make_synthetic OUT: writes a recording of a synthetic furnished room as a folder of images with exact poses.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -20,12 +20,12 @@ struct Options {
   int frames = 60;
   int width = 640;
   int height = 480;
-  double focal = 0;  ///< [pixel]; 0: of a Kinect's field of view
+  double focal = 0;  ///< [pixel]; 0: that of a Kinect
   replay::CameraPath path = replay::CameraPath::kOrbit;
   replay::SensorModel sensor;
 };
 
-/// "640x480" into its numbers; CLI11's way to say what is wrong, or nothing.
+/// Reads a size such as "640x480". @return an empty text, or what is wrong, as CLI11 validators do
 std::string read_size(const std::string& text, int& width, int& height) {
   char rest = 0;
   const bool well_formed = std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) == 2;
@@ -35,7 +35,7 @@ std::string read_size(const std::string& text, int& width, int& height) {
 
 std::ofstream open_text(const fs::path& path) {
   std::ofstream file(path);
-  file.precision(17);  // doubles come back bit for bit
+  file.precision(17);  // doubles are read back bit for bit
   if (!file) throw FileError(path.string() + " cannot be written: check that the folder is yours and has space.");
   return file;
 }
@@ -100,23 +100,28 @@ int main(int argc, char** argv) {
   CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.");
   app.failure_message(CLI::FailureMessage::help);
   app.option_defaults()->always_capture_default();
-  app.add_option("OUT", options.output, "the folder to be written")->required();
-  app.add_option("--frames", options.frames, "so many from the path's beginning to its end")->check(CLI::Range(1, 999999));
+  app.add_option("OUT", options.output, "folder to write")->required();
+  app.add_option("--frames", options.frames, "number of frames along the whole path")->check(CLI::Range(1, 999999));
   const std::map<std::string, replay::CameraPath> paths = {{"orbit", replay::CameraPath::kOrbit},
+                                                           {"explore", replay::CameraPath::kExplore},
                                                            {"turn", replay::CameraPath::kTurn},
                                                            {"walk", replay::CameraPath::kWalk},
                                                            {"close", replay::CameraPath::kClose}};
-  app.add_option("--path", options.path,
-                 "of the camera: around the table, a turn on the spot, a walk into the corridor, or close to things")
+  app.add_option(
+         "--path", options.path,
+         "path of the camera: orbit (around the table), explore (around the table, looking everywhere), turn (on the spot), walk (into "
+         "the corridor) or close (near the furniture)")
       ->transform(CLI::CheckedTransformer(paths))
       ->default_str("orbit");
-  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect's field of view")->check(CLI::Range(0.0, 1e5));
-  app.add_flag("--noise", options.sensor.noise, "Kinect-like: a deviation of 1.425e-3 z^2, in steps of disparity");
-  app.add_option("--dropouts", options.sensor.dropouts, "share of pixels lost in blobs; also at edges and grazing angles")
+  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect")->check(CLI::Range(0.0, 1e5));
+  app.add_flag("--noise", options.sensor.noise,
+               "depth noise like that of a Kinect: standard deviation 1.425e-3 z^2 [m], whole steps of disparity");
+  app.add_option("--dropouts", options.sensor.dropouts,
+                 "share of pixels that are lost in blobs; above 0, most pixels at edges and at grazing angles are lost as well")
       ->check(CLI::Range(0.0, 0.9));
-  app.add_option("--seed", options.sensor.seed, "of noise and dropouts");
+  app.add_option("--seed", options.sensor.seed, "seed of noise and dropouts");
   std::string size = "640x480";
-  app.add_option("--size", size, "of the images")->check([&](const std::string& text) {
+  app.add_option("--size", size, "width and height of the images [pixel]")->check([&](const std::string& text) {
     return read_size(text, options.width, options.height);
   });
   try {

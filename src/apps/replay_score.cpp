@@ -15,24 +15,27 @@
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
 #include "replay/sweep.hpp"
+#ifdef FRONTIER_SURFELS_WITH_ROS
+#include "ros/input/parameter_table.hpp"
+#endif
 
 namespace frontier_surfels::replay {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The command line, checked.
+/// The options after all checks.
 struct Options {
   Recording recording;
-  std::string report;  ///< folder
+  std::string report;  ///< folder of the report
   Config config;
-  double octomap_resolution = 0.01;  ///< [m]; 0: off
+  double octomap_resolution = 0.01;  ///< voxel size [m]; 0: no OctoMap
   bool exact = true;
   std::optional<Sweep> sweep;
   std::optional<LiveOptions> live;
 };
 
-/// The command line as text; what needs the configuration is read from it afterwards.
+/// Options as given on the command line, before they become a Config, a Sweep and LiveOptions.
 struct RawOptions {
   std::string config_file;
   std::vector<std::string> settings;
@@ -43,35 +46,52 @@ struct RawOptions {
   bool live = false;
 };
 
+/// doc/parameters.md is this text.
+void print_parameters() {
+  std::cout
+      << "# Parameters\n\n"
+         "This file is the output of `replay_score --parameters`: do not edit it. The terms are explained in [method.md](method.md).\n\n"
+         "Parameters are set in a YAML file (`--config FILE.yaml` of the programs, `config:=FILE.yaml` of the launch files; see\n"
+         "[config](../config)), one by one (`--set NAME=VALUE` of replay_score), under `~` of the ROS node, or in C++ as members of\n"
+         "`frontier_surfels::Config`. They are checked together at the start, and cannot be changed later.\n"
+      << parameter_table();
+#ifdef FRONTIER_SURFELS_WITH_ROS
+  std::cout << node_parameter_table();
+#endif
+}
+
 void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   SourceOptions& source = options.recording.options;
   app.add_option("INPUT", options.recording.path, "a bag, or a folder (TUM RGB-D layout, or depth/ + poses.txt + camera.txt)")->required();
   app.add_option("--report", options.report, "folder for the report; made if it is missing")->required()->type_name("DIR");
-  app.add_option("--config", raw.config_file, "parameters of the mapper")->type_name("FILE.yaml");
-  app.add_option("--set", raw.settings, "one parameter of the mapper; can be given again and again")
+  app.add_option("--config", raw.config_file, "YAML file with parameters of the mapper")->type_name("FILE.yaml");
+  app.add_option("--set", raw.settings, "set one parameter of the mapper; can be repeated")
       ->type_name("key=value")
       ->allow_extra_args(false);
   app.add_option("--first", source.first, "index of the first frame")->type_name("N")->check(CLI::NonNegativeNumber);
   app.add_option("--last", source.last, "index of the last frame; -1: the end")->type_name("N")->check(CLI::Range(-1, INT32_MAX));
-  app.add_option("--stride", source.stride, "every so many frames")->type_name("N")->check(CLI::PositiveNumber);
+  app.add_option("--stride", source.stride, "use every N-th frame")->type_name("N")->check(CLI::PositiveNumber);
   app.add_option("--depth-topic", source.depth_topic, "bags: topic of the depth images")->type_name("T");
-  app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's info")->type_name("T");
+  app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's camera_info")->type_name("T");
   app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
   app.add_option("--world-frame", source.world_frame, "bags: tf frame of the map")->type_name("F");
-  app.add_option("--octomap-resolution", options.octomap_resolution, "voxel of the OctoMap beside [m], 0.01 unless given; 0: none")
+  app.add_option("--octomap-resolution", options.octomap_resolution,
+                 "voxel size [m] of the OctoMap that is built for comparison, default 0.01; 0: none")
       ->type_name("M");
-  app.add_flag("--no-exact", raw.no_exact, "leave the exact test out");
-  app.add_option("--threads", raw.threads, "threads of the mapper and the scorers; 0: all")->type_name("N")->check(CLI::NonNegativeNumber);
-  app.add_option("--sweep", raw.sweep, "repeat the run over N values of a parameter")->type_name("PARAM=LO:HI:N");
-  app.add_flag("--live", raw.live, "bags: publish it into a mapper node that runs already, and score the map that it publishes");
-  app.add_option("--mapper", raw.mapper, "name of that node, mapper unless given")->type_name("NAME")->needs("--live");
+  app.add_flag("--no-exact", raw.no_exact, "leave out the exact test");
+  app.add_option("--threads", raw.threads, "number of threads of the mapper and the scores; 0: all")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--sweep", raw.sweep, "repeat the run for N values of a parameter from LO to HI")->type_name("PARAM=LO:HI:N");
+  app.add_flag("--live", raw.live, "bags: publish the recording to a running mapper node, and score the map that the node publishes");
+  app.add_option("--mapper", raw.mapper, "name of that node, default: mapper")->type_name("NAME")->needs("--live");
   app.add_flag_callback(
       "--parameters",
       [] {
-        std::cout << parameter_table();
+        print_parameters();
         throw CLI::Success();
       },
-      "print all parameters of the mapper");
+      "print all parameters, as in doc/parameters.md");
 }
 
 /// @throws CLI::ValidationError with every fault of the settings and the configuration
@@ -92,12 +112,12 @@ void read_config(const RawOptions& raw, Config& config) {
   if (!problems.empty()) throw CLI::ValidationError("", problems);
 }
 
-/// @throws CLI::ValidationError for what a running mapper has been told already
+/// @throws CLI::ValidationError if parameters of the mapper are given: a running mapper has its own
 LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& ros_arguments) {
   if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
     throw CLI::ValidationError("--live",
-                               "the running mapper's own parameters count: set them where it is started, and leave --config, --set, "
-                               "--threads and --sweep out");
+                               "the running mapper has parameters of its own: set them where it is started, and leave out --config, --set, "
+                               "--threads and --sweep");
   }
   LiveOptions live;
   if (!raw.mapper.empty()) live.mapper = raw.mapper;
@@ -109,9 +129,10 @@ LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& 
 Options parse(int argc, char** argv) {
   Options options;
   RawOptions raw;
-  std::vector<std::string> arguments(std::make_reverse_iterator(argv + argc), std::make_reverse_iterator(argv + 1));  // as CLI wants them
+  std::vector<std::string> arguments(std::make_reverse_iterator(argv + argc),
+                                     std::make_reverse_iterator(argv + 1));  // CLI11 takes them in reverse
   const auto is_ours = [](const std::string& argument) { return argument.find(":=") == std::string::npos; };
-  const auto ros = std::stable_partition(arguments.begin(), arguments.end(), is_ours);  // roslaunch adds some of its own
+  const auto ros = std::stable_partition(arguments.begin(), arguments.end(), is_ours);  // roslaunch adds some with ':='
   const std::vector<std::string> ros_arguments(ros, arguments.end());
   arguments.erase(ros, arguments.end());
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
@@ -121,7 +142,7 @@ Options parse(int argc, char** argv) {
     app.parse(arguments);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
-    // The upper bound catches millimetres, the lower one more voxels than fit any memory; NaN fails both.
+    // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
     const double resolution = options.octomap_resolution;
     if (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10))
       throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
@@ -137,7 +158,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-/// Makes the folder, proves that it can be written before hours are spent, and removes what an earlier run may have left there.
+/// Makes the folder, checks that it can be written before a long run starts, and removes the files of an earlier run.
 void prepare_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -151,7 +172,7 @@ void prepare_folder(const fs::path& folder) {
   }
 }
 
-/// What is known before scoring: a second Ctrl-C leaves at least that.
+/// Writes what is known before the map is scored, so that it is kept if scoring is interrupted.
 void write_map(const fs::path& folder, const Run& run) {
   write_ply(folder / "surfels.ply", run.surfels);
   write_file(folder / "frames.csv", frames_csv(run.frames));
@@ -165,7 +186,7 @@ void write_scores(const fs::path& folder, const Yardsticks& yardsticks, const Sc
   write_file(folder / "summary.json", summary.dump(2) + "\n");
 }
 
-/// Many frames are often passed over for one and the same reason, so the first few say it.
+/// Prints the first few reasons: many frames are often skipped for the same one.
 void tell_skipped(const std::vector<std::string>& skipped) {
   constexpr std::size_t kShown = 5;
   for (std::size_t i = 0; i < std::min(skipped.size(), kShown); ++i) std::cerr << "Skipped a frame: " << skipped[i] << "\n";
@@ -181,9 +202,10 @@ void replay_and_score(const Options& options) {
 
   Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
   const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
-  live.reset();  // scoring takes its time: the mapper must not send to somebody who does not listen
+  live.reset();  // disconnects: the mapper must not send to a program that is busy scoring
   tell_skipped(run.skipped);
-  if (run.stopped) std::cerr << "Stopped after " << run.frames.size() << " frames: these are scored and written. Once more ends at once.\n";
+  if (run.stopped)
+    std::cerr << "Stopped after " << run.frames.size() << " frames, which are now scored and written. Press Ctrl-C again to end at once.\n";
   write_map(folder, run);
 
   const Scores scores = score(run.surfels, yardsticks, config.threads);
@@ -204,6 +226,6 @@ void replay_and_score(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace frontier_surfels::replay;
-  return run_command("replay_score", "leave the OctoMap out (--octomap-resolution 0) or replay fewer frames (--last, --stride).",
+  return run_command("replay_score", "leave out the OctoMap (--octomap-resolution 0) or replay fewer frames (--last, --stride).",
                      [&] { replay_and_score(parse(argc, argv)); });
 }

@@ -1,4 +1,4 @@
-/// sequence_to_bag FOLDER OUT.bag: a folder of images and poses as a bag, for whatever wants to play it.
+/// sequence_to_bag FOLDER OUT.bag: writes a recording in a folder as a bag.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
@@ -13,23 +13,24 @@ int main(int argc, char** argv) {
   replay::BagOptions options;
   bool no_slashes = false;
 
-  CLI::App app("Writes a recorded sequence as a bag, with the topics and frames of the TUM RGB-D benchmark's bags.");
+  CLI::App app("Writes a recorded sequence as a bag, with the topics and tf frames of the TUM RGB-D benchmark's bags.");
   app.failure_message(CLI::FailureMessage::help);
   app.option_defaults()->always_capture_default();
-  app.add_option("FOLDER", folder, "depth/ + poses.txt + camera.txt, or TUM RGB-D layout")->required();
-  app.add_option("OUT.bag", output, "the bag to be written")->required();
-  app.add_option("--encoding", options.encoding, "of depth images")->check(CLI::IsMember({"32FC1", "16UC1"}));
-  app.add_flag("--compressed", options.compressed, "compressedDepth and JPEG instead of raw images (32FC1 depth is then quantised)");
-  app.add_option("--compression", options.compression, "of the bag")->check(CLI::IsMember({"none", "lz4", "bz2"}));
-  app.add_flag("--no-slashes", no_slashes, "frame names without leading slashes");
-  app.add_flag("--static-tf", options.static_transforms, "constant transforms on /tf_static (latched) instead of on /tf");
-  app.add_option("--depth-topic", options.depth_topic);
-  app.add_option("--info-topic", options.depth_info_topic);
-  app.add_option("--color-topic", options.color_topic);
-  app.add_option("--color-info-topic", options.color_info_topic);
+  app.add_option("FOLDER", folder, "folder of the recording: depth/ + poses.txt + camera.txt, or TUM RGB-D layout")->required();
+  app.add_option("OUT.bag", output, "bag to write")->required();
+  app.add_option("--encoding", options.encoding, "encoding of the depth images")->check(CLI::IsMember({"32FC1", "16UC1"}));
+  app.add_flag("--compressed", options.compressed,
+               "write compressedDepth and JPEG images instead of raw ones; depth as 32FC1 is then quantised");
+  app.add_option("--compression", options.compression, "compression of the bag")->check(CLI::IsMember({"none", "lz4", "bz2"}));
+  app.add_flag("--no-slashes", no_slashes, "write the names of tf frames without leading slashes");
+  app.add_flag("--static-tf", options.static_transforms, "write constant transforms to /tf_static (latched) instead of to /tf");
+  app.add_option("--depth-topic", options.depth_topic, "topic of the depth images");
+  app.add_option("--info-topic", options.depth_info_topic, "topic of the depth camera's camera_info");
+  app.add_option("--color-topic", options.color_topic, "topic of the colour images");
+  app.add_option("--color-info-topic", options.color_info_topic, "topic of the colour camera's camera_info");
   app.add_option("--first", source_options.first, "index of the first frame");
   app.add_option("--last", source_options.last, "index of the last frame; -1: the end");
-  app.add_option("--stride", source_options.stride, "every so many frames");
+  app.add_option("--stride", source_options.stride, "use every N-th frame");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -42,7 +43,7 @@ int main(int argc, char** argv) {
     const replay::BagSummary summary = replay::write_bag(*source, output, options);
     for (const std::string& sentence : source->notes()) std::printf("%s\n", sentence.c_str());
     for (const std::string& sentence : source->skipped()) std::printf("%s\n", sentence.c_str());
-    if (summary.stamp_shift != 0) std::printf("All stamps are shifted by %.0f s, as ROS has no time 0.\n", summary.stamp_shift);
+    if (summary.stamp_shift != 0) std::printf("All stamps are shifted by %.0f s, because ROS has no time 0.\n", summary.stamp_shift);
     std::printf("%zu frames are in %s.\n", summary.frames, output.c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

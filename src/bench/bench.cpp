@@ -1,4 +1,4 @@
-/// bench: what a frame costs in time and memory, as tables and as JSON.
+/// bench: measures what a frame costs in time and memory; prints tables and writes JSON.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
@@ -14,12 +14,12 @@ namespace frontier_surfels::bench {
 
 const std::vector<Section>& sections() {
   static const std::vector<Section> all = {
-      {"frames", "whole frames: image sizes, depth ranges, threads", measure_frames},
-      {"stages", "one frame again and again: the stages' steadiest times", measure_stages},
-      {"octomap", "OctoMap's insertPointCloud beside ours", measure_octomap},
-      {"map_size", "1 to 50 million surfels in the map", measure_map_size},
-      {"start", "start-up with and without built kernels", measure_start},
-      {"memory", "of the map, beside the map, and of the process", measure_memory},
+      {"frames", "whole frames for several image sizes, depth ranges and numbers of threads", measure_frames},
+      {"stages", "one frame repeated: the steadiest times of the stages", measure_stages},
+      {"octomap", "OctoMap's insertPointCloud on the same frames, for comparison", measure_octomap},
+      {"map_size", "frames in maps of 1 to 50 million surfels", measure_map_size},
+      {"start", "start-up with and without compiled kernels in the cache", measure_start},
+      {"memory", "memory of the map, of everything else on the device, and of the process", measure_memory},
   };
   return all;
 }
@@ -30,28 +30,30 @@ using nlohmann::ordered_json;
 
 void declare_options(CLI::App& app, Options& options) {
   std::vector<std::string> names;
-  std::string footer = "Sections, all of them unless --only names some:\n";
+  std::string footer = "Sections (all of them are measured unless --only names some):\n";
   for (const Section& section : sections()) {
     names.push_back(section.name);
     footer += "  " + names.back() + std::string(10 - names.back().size(), ' ') + section.what + "\n";
   }
   app.footer(footer);
-  app.add_option("INPUT", options.inputs, "bags, or folders as replay_score takes them; none: a synthetic room");
-  app.add_option("--frames", options.frames, "of each input, from its first on, 100 unless given; 0: all")
+  app.add_option("INPUT", options.inputs, "bags or folders, as replay_score takes them; none: a synthetic room");
+  app.add_option("--frames", options.frames, "use the first N frames of each input, default 100; 0: all")
       ->type_name("N")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--only", options.sections, "some of the sections below")->type_name("SECTION...")->check(CLI::IsMember(names));
-  app.add_option("--octomap-frames", options.octomap_frames, "frames for OctoMap, taken evenly, 20 unless given; 0: all")
+  app.add_option("--only", options.sections, "measure only these sections, which are listed below")
+      ->type_name("SECTION...")
+      ->check(CLI::IsMember(names));
+  app.add_option("--octomap-frames", options.octomap_frames, "number of frames for OctoMap, evenly spaced, default 20; 0: all")
       ->type_name("N")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--row-seconds", options.row_seconds, "a row takes frames for so long, 120 unless given")
+  app.add_option("--row-seconds", options.row_seconds, "end a row of a table after S seconds, default 120")
       ->type_name("S")
       ->check(CLI::PositiveNumber);
   app.add_option("--config", options.config_file,
-                 "parameters of the mapper; decimation and, where they are varied, z_max and threads are set")
+                 "YAML file with parameters of the mapper; bench itself sets decimation, and z_max and threads where it varies them")
       ->type_name("FILE.yaml");
-  app.add_option("--json", options.json, "where all numbers are written")->type_name("FILE");
-  app.add_flag("--quick", options.quick, "a few small frames, to see that everything runs: the numbers mean nothing");
+  app.add_option("--json", options.json, "write all numbers to this file")->type_name("FILE");
+  app.add_flag("--quick", options.quick, "only check that everything runs, with a few small frames; the numbers mean nothing");
   app.add_option("--child", options.child)->check(CLI::IsMember({"start", "memory"}))->group("");  // see child_process.hpp
 }
 
@@ -89,7 +91,7 @@ void measure(const Options& options) {
   const auto write = [&] {
     if (!options.json.empty()) replay::write_file(options.json, json.dump(2) + "\n");
   };
-  write();  // hours before it is needed
+  write();  // fails now, rather than after hours, if the file cannot be written
   replay::catch_first_interrupt();
   std::cout << device << std::endl;
   for (const Section& section : sections()) {
@@ -99,7 +101,8 @@ void measure(const Options& options) {
   }
   json["complete"] = !replay::stop_requested();
   write();
-  if (replay::stop_requested()) std::cerr << "Stopped: what was measured until then is above and in the JSON file, if there is one.\n";
+  if (replay::stop_requested())
+    std::cerr << "Stopped. What was measured so far is printed above, and is in the JSON file if --json was given.\n";
 }
 
 void measure_as_child(const Options& options) {
@@ -113,7 +116,7 @@ void measure_as_child(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace frontier_surfels;
-  return replay::run_command("bench", "leave map_size out (--only), or take fewer frames (--frames).", [&] {
+  return replay::run_command("bench", "leave out map_size (--only), or take fewer frames (--frames).", [&] {
     const bench::Options options = bench::parse(argc, argv);
     options.child.empty() ? bench::measure(options) : bench::measure_as_child(options);
   });

@@ -33,7 +33,7 @@ std::vector<std::string> environment(const std::string& kernel_cache) {
   return variables;
 }
 
-/// As posix_spawn wants them; valid as long as `words`.
+/// The words as posix_spawn takes them. The pointers are valid as long as `words`.
 std::vector<char*> pointers(std::vector<std::string>& words) {
   std::vector<char*> result;
   for (std::string& word : words) result.push_back(word.data());
@@ -41,7 +41,9 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   return result;
 }
 
-/// Starts this very program. @return its process; `output` is where its standard output can be read
+/// Starts this very program.
+/// @param output  gets the file descriptor from which its standard output can be read
+/// @return the process
 pid_t start(std::vector<std::string> words, std::vector<std::string> variables, int& output) {
   int pipe_ends[2];
   if (pipe2(pipe_ends, O_CLOEXEC) != 0) throw Error(std::string("No pipe could be opened: ") + std::strerror(errno) + ".");
@@ -75,7 +77,7 @@ nlohmann::ordered_json run_child(const std::string& what, const Options& options
   close(output);
   int status = 0;
   while (waitpid(process, &status, 0) < 0 && errno == EINTR) continue;
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Error("The process that measures '" + what + "' failed; it says above why.");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Error("The process that measures '" + what + "' failed; its message is above.");
   return nlohmann::ordered_json::parse(said);
 }
 

@@ -1,4 +1,4 @@
-/// Whole frames: sizes of the working image, depth ranges, threads.
+/// Section "frames": whole frames, for several sizes of the working image, depth ranges and numbers of threads.
 #include <algorithm>
 
 #include "apps/interrupt.hpp"
@@ -15,7 +15,7 @@ std::string size_text(const ordered_json& row) { return std::to_string(int(row["
 
 std::string threads_text(const ordered_json& row) { return row["threads"] == 0 ? "all" : std::to_string(int(row["threads"])); }
 
-/// One for each size that the images can be decimated to.
+/// One configuration for each image size: 160, 320 and 640 pixels wide, where the images are large enough.
 std::vector<Config> sizes(const Input& input, bool quick) {
   std::vector<Config> configs;
   for (const int width : quick ? std::vector<int>{kUsualWidth} : std::vector<int>{kUsualWidth, 2 * kUsualWidth, 4 * kUsualWidth}) {
@@ -55,7 +55,7 @@ void print_row(const Table& table, const ordered_json& row) {
   table.row(cells);
 }
 
-/// A stage a line, a row of the table before a column.
+/// Prints a table with a line for each stage and a column for each of `rows`.
 void print_stages(const std::vector<ordered_json>& rows) {
   std::vector<std::string> heads = {"stage"}, names;
   std::vector<ordered_json> stages;

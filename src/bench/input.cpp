@@ -11,10 +11,10 @@ namespace {
 
 constexpr int kDefaultSyntheticFrames = 100;
 
-/// The room as a Kinect sees it, rendered when a frame is asked for: nothing is kept that would count as memory of the mapper.
+/// The synthetic room with a Kinect's noise. Frames are rendered when they are asked for, so that no stored images count as memory.
 class SyntheticSource : public replay::FrameSource {
  public:
-  /// @param frames  of the whole way around the table
+  /// @param frames  number of frames of the whole way around the table
   SyntheticSource(int frames, const replay::SourceOptions& selection, const Intrinsics& camera)
       : frames_(frames), stride_(selection.stride), end_(selection.last < 0 ? frames : selection.last + 1), camera_(camera) {}
 

@@ -1,4 +1,4 @@
-/// What is mapped: a recording, or a synthetic room.
+/// What is mapped: a recording or the synthetic room.
 #pragma once
 
 #include <memory>
@@ -10,23 +10,23 @@
 
 namespace frontier_surfels::bench {
 
-/// An input that is read from its beginning as often as it is asked for.
+/// An input that can be read from its beginning any number of times.
 class Input {
  public:
-  /// @param path    of a bag or folder; empty: the synthetic room
-  /// @throws Error  it cannot be read, or has no usable frame
+  /// @param path    a bag or a folder; empty: the synthetic room
+  /// @throws Error  if it cannot be read, or has no usable frame
   Input(const std::string& path, const Options& options);
 
   const std::string& path() const { return path_; }
   const std::string& name() const { return name_; }
 
-  /// @param frames  so many, taken evenly over all that the options ask for; 0: all of these
+  /// @param frames  number of frames, evenly spaced over those that the options select; 0: all of these
   std::unique_ptr<replay::FrameSource> open(int frames = 0) const;
 
-  /// The base configuration, with the decimation that gives images about so wide.
+  /// The base configuration with the decimation that makes images about `width` pixels wide.
   Config config(int width) const;
 
-  /// Of the images after decimation.
+  /// Size of the images after decimation [pixel].
   int width(const Config& config) const { return camera_.width / config.decimation; }
   int height(const Config& config) const { return camera_.height / config.decimation; }
 

@@ -1,5 +1,6 @@
-/// The same frames in maps of 1 to 50 million surfels: the mapped room, and copies of it side by side. A loaded map comes without recent
-/// views, so that every frame asks the surfels: what a large map costs once its first views are forgotten.
+/// Section "map_size": the same frames in maps of 1 to 50 million surfels, which are the mapped room and copies of it side by side. A
+/// loaded map has no recent views, so that every frame must ask the surfels what is known: this is what a large map costs after views have
+/// been forgotten.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,12 +19,12 @@ using nlohmann::ordered_json;
 
 constexpr double kMillion = 1e6;
 
-/// Of the warm frames.
+/// Times of the warm frames.
 struct Times {
   std::vector<double> wall_ms, cpu_ms;
 };
 
-/// Where copies of the room go, the room itself first: rings of cells around it.
+/// Cells of a plane for the copies of the room, in growing rings around the room itself, which is the first.
 std::vector<Eigen::Vector2i> cells_around(std::size_t count) {
   std::vector<Eigen::Vector2i> cells;
   for (int ring = 0; cells.size() < count; ++ring) {
@@ -36,8 +37,8 @@ std::vector<Eigen::Vector2i> cells_around(std::size_t count) {
   return cells;
 }
 
-/// Copies of the room until there are `wanted` surfels or a few more. They are so far apart that none comes into the view of another:
-/// the number of surfels near the view stays the same.
+/// Copies of the room until there are at least `wanted` surfels. The copies are so far apart that no view sees two of them: the number of
+/// surfels near the view is the same in all maps.
 std::vector<Surfel> tiled(const std::vector<Surfel>& room, double wanted, double z_max) {
   Eigen::AlignedBox3f box;
   for (const Surfel& surfel : room) box.extend(surfel.position);
@@ -73,7 +74,7 @@ ordered_json measure_row(const Options& options, const Input& input, const std::
   attempt(row, [&] {
     const auto source = input.open();
     Mapper mapper(config);
-    mapper.load(tiled(room, millions * kMillion, config.z_max));  // which is gone before the frames come
+    mapper.load(tiled(room, millions * kMillion, config.z_max));  // a temporary, freed before frames are measured
     row["loaded"] = mapper.size();
     const auto run = run_frames(mapper, *source, options);
     add_figures(run, row);
@@ -86,7 +87,7 @@ ordered_json measure_row(const Options& options, const Input& input, const std::
   return row;
 }
 
-/// Of the medians over the frames that both runs have come to; not of runs without any.
+/// Adds the ratio of the medians over the frames that both runs have mapped, if there are any.
 void add_ratio(std::vector<double> times, std::vector<double> smallest, const char* name, ordered_json& row) {
   const std::size_t both = std::min(times.size(), smallest.size());
   if (both == 0) return;

@@ -1,4 +1,4 @@
-/// Whole frames, mapped by the code that replay_score maps with.
+/// Runs over whole frames, with the same code as in replay_score.
 #pragma once
 
 #include <functional>
@@ -9,22 +9,22 @@
 
 namespace frontier_surfels::bench {
 
-/// Images are reduced to about this width where nothing else is said: a quarter of what a Kinect gives.
+/// Width of the working image where a section does not vary it: a quarter of a Kinect's.
 constexpr int kUsualWidth = 160;
 
 using AfterFrame = std::function<void(const DepthFrame&, replay::FrameRecord&)>;
 
-/// Ends with the frames, after options.row_seconds, or with Ctrl-C.
-/// @throws Error  not one frame could be used
+/// Maps frames until there are no more, options.row_seconds have passed, or Ctrl-C is pressed.
+/// @throws Error  if no frame could be used
 replay::Run run_frames(Mapper& mapper, replay::FrameSource& source, const Options& options, const AfterFrame& after_frame = {});
 
-/// Adds to `row`: frames, times (all but the first frames), surfels and memory.
+/// Adds the number of frames, the times without the first frames, the number of surfels and the memory to `row`.
 void add_figures(const replay::Run& run, nlohmann::ordered_json& row);
 
 /// @param values  not empty
 nlohmann::ordered_json statistics_json(const std::vector<double>& values);
 
-/// What cannot be measured, as a device may be too small, leaves a sentence in row["error"] and the other rows undisturbed.
+/// Runs `measure`. If it throws, as when the device is too small, the message goes to row["error"], and other rows can still be measured.
 void attempt(nlohmann::ordered_json& row, const std::function<void()>& measure);
 
 }  // namespace frontier_surfels::bench

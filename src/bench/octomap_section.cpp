@@ -1,4 +1,4 @@
-/// OctoMap's insertion beside the mapper, frame by frame, so that whatever disturbs the machine disturbs both.
+/// Section "octomap": OctoMap and the mapper take turns frame by frame, so that other load on the machine affects both alike.
 #include "apps/interrupt.hpp"
 #include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
@@ -24,8 +24,8 @@ ordered_json measure_row(const Options& options, const Input& input) {
   const double resolution = options.quick ? kQuickResolution : kResolution;
   ordered_json row = {{"input", input.name()}, {"resolution", resolution}, {"z_max", config.z_max}};
   attempt(row, [&] {
-    // OctoMap takes a second or more a frame, so that few frames are given. Both maps are made of these and of nothing else: a tree that
-    // lacks the frames between is not compared with a map that has them, and both see as much new space in a frame.
+    // OctoMap takes a second or more for a frame, so that only a few frames are used. Both maps get the same ones, so that both see the
+    // same amount of new space in each.
     const auto source = input.open(options.octomap_frames);
     Mapper mapper(config);
     scoring::OctomapTruth octomap(resolution, config.z_min, config.z_max, config.decimation);

@@ -1,4 +1,4 @@
-/// Start-up and memory, each in a process of its own.
+/// Sections "start" and "memory": each measurement runs in a process of its own.
 #include <stdlib.h>
 
 #include <chrono>
@@ -21,7 +21,7 @@ double since_ms(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// An empty folder, removed with all that has been put into it.
+/// An empty folder that is removed at the end with everything in it.
 class TemporaryFolder {
  public:
   TemporaryFolder() : path_((std::filesystem::temp_directory_path() / "bench_kernels_XXXXXX").string()) {
@@ -72,8 +72,8 @@ ordered_json child_start(const Input& input) {
 
 ordered_json measure_start(const Options& options, const std::vector<Input>& inputs) {
   ordered_json rows = ordered_json::array();
-  const Table table("Start-up: a mapper made, and its first frame mapped, in a new process, ms",
-                    {"input", "kernels cold", "kernels warm", "of that constructor", "first frame"});
+  const Table table("Start-up in a new process: constructor and first frame, ms",
+                    {"input", "no kernel cache", "with cache", "of it constructor", "first frame"});
   for (const Input& input : inputs) {
     if (replay::stop_requested()) break;
     const ordered_json row = start_row(options, input);
@@ -103,13 +103,13 @@ ordered_json child_memory(const Options& options, const Input& input) {
 
 ordered_json measure_memory(const Options& options, const std::vector<Input>& inputs) {
   ordered_json rows = ordered_json::array();
-  const Table table("Memory in a new process, MB; RSS: the most so far of the process, the device's driver included",
+  const Table table("Memory in a new process, MB; RSS: largest so far, with the device's driver",
                     {"input", "frames", "surfels", "map", "bytes a surfel", "working", "RSS before", "mapper made", "at the end"});
   for (const Input& input : inputs) {
     if (replay::stop_requested()) break;
     ordered_json row = {{"input", input.name()}};
     attempt(row, [&] {
-      run_child("start", options, input);  // what compiling the kernels takes is not to count
+      run_child("start", options, input);  // compiles the kernels, whose memory must not be counted
       row = run_child("memory", options, input);
     });
     if (row.contains("error")) {

@@ -1,4 +1,4 @@
-/// What is measured: a table on standard output, and the same and more as JSON, for each.
+/// The sections of the benchmark. Each prints tables on standard output and returns the same numbers and more as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,10 +13,10 @@ namespace frontier_surfels::bench {
 struct Section {
   const char* name;
   const char* what;
-  nlohmann::ordered_json (*measure)(const Options& options, const std::vector<Input>& inputs);  ///< rows
+  nlohmann::ordered_json (*measure)(const Options& options, const std::vector<Input>& inputs);  ///< prints tables, returns rows
 };
 
-/// In the order in which they are measured.
+/// All sections in the order in which they are measured.
 const std::vector<Section>& sections();
 
 nlohmann::ordered_json measure_frames(const Options& options, const std::vector<Input>& inputs);
@@ -26,7 +26,7 @@ nlohmann::ordered_json measure_map_size(const Options& options, const std::vecto
 nlohmann::ordered_json measure_start(const Options& options, const std::vector<Input>& inputs);
 nlohmann::ordered_json measure_memory(const Options& options, const std::vector<Input>& inputs);
 
-/// What the processes measure that measure_start() and measure_memory() start: both need one that has done nothing before.
+/// What the child processes of measure_start() and measure_memory() measure.
 nlohmann::ordered_json child_start(const Input& input);
 nlohmann::ordered_json child_memory(const Options& options, const Input& input);
 

@@ -1,4 +1,5 @@
-/// One frame again and again into a map that has it already: the steadiest figures, to compare a kernel before and after a change.
+/// Section "stages": one frame is integrated repeatedly into a map that contains it already. These are the steadiest figures, for comparing
+/// a kernel before and after a change.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -16,7 +17,7 @@ using nlohmann::ordered_json;
 
 constexpr int kRepetitions = 5;
 
-/// Keeps the medians over the repetitions, and prints nothing itself.
+/// Keeps the medians over the repetitions and prints nothing.
 class Medians : public benchmark::BenchmarkReporter {
  public:
   explicit Medians(ordered_json& row) : row_(row) {}
@@ -35,7 +36,7 @@ class Medians : public benchmark::BenchmarkReporter {
   ordered_json& row_;
 };
 
-/// @param fault  set where the mapper threw: exceptions do not pass through Google Benchmark
+/// @param fault  gets the message if the mapper throws: exceptions cannot pass through Google Benchmark
 void integrate_again(benchmark::State& state, Mapper& mapper, const DepthFrame& frame, std::string& fault) {
   for (auto _ : state) {
     try {
@@ -57,7 +58,7 @@ ordered_json measure_row(const Options& options, const Input& input, const Confi
     Mapper mapper(config);
     const auto source = input.open();
     const auto run = run_frames(mapper, *source, options);
-    for (const std::string& name : replay::stage_names(run.frames)) row["stages"][name] = 0;  // in their order
+    for (const std::string& name : replay::stage_names(run.frames)) row["stages"][name] = 0;  // puts them in order
     const auto frame = input.open(1)->next();
     if (!frame) throw Error("The first frame could not be read again.");
 
@@ -77,7 +78,7 @@ ordered_json measure_row(const Options& options, const Input& input, const Confi
   return row;
 }
 
-/// A stage a line, a row a column.
+/// Prints a table with a line for each stage and a column for each of `rows`.
 void print(const Input& input, const std::vector<ordered_json>& rows) {
   std::vector<std::string> heads = {"stage"}, names, whole = {"whole frame"}, cpu = {"CPU"}, spread = {"deviation"};
   std::vector<ordered_json> good;
@@ -95,7 +96,7 @@ void print(const Input& input, const std::vector<ordered_json>& rows) {
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
   if (good.empty()) return;
-  const Table table("One frame of " + input.name() + " again and again, ms (recent views kept, threads)", heads);
+  const Table table("One frame of " + input.name() + " repeated, ms (kept views, threads)", heads);
   for (const std::string& name : names) {
     std::vector<std::string> cells = {name};
     for (const ordered_json& row : good) cells.push_back(row["stages"].contains(name) ? fixed(row["stages"][name], 2) : "-");
@@ -111,7 +112,7 @@ ordered_json measure_stages(const Options& options, const std::vector<Input>& in
   for (const Input& input : inputs) {
     std::vector<ordered_json> rows;
     Config config = input.config(kUsualWidth);
-    // Without recent views the surfels are asked in every frame, so that all kernels run: these rows know every stage's name.
+    // Without recent views the surfels are asked in every frame, so that all kernels run: these rows have every stage.
     for (const int views : {0, config.recent_views}) {
       for (const int threads : {1, 0}) {
         if (replay::stop_requested()) break;

@@ -1,4 +1,4 @@
-/// A table on standard output that grows while it is measured.
+/// A table on standard output that grows row by row.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@ namespace frontier_surfels::bench {
 
 class Table {
  public:
-  /// Prints title and head. The first column is as wide as an input's name may be, the others as their heads.
+  /// Prints the title and the heads. The first column has a fixed width for names, the others the width of their heads.
   Table(const std::string& title, const std::vector<std::string>& heads);
 
-  /// @param cells  those that are missing stay empty; a last one that is longer than its column may be a sentence
+  /// @param cells  may be fewer than heads; the last one may be a sentence longer than its column
   void row(const std::vector<std::string>& cells) const;
 
  private:

@@ -66,7 +66,7 @@ std::string suggestion(const std::string& name, const std::vector<std::string>& 
       nearest = candidate;
     }
   }
-  return nearest.empty() ? "; README.md lists all parameters." : "; did you mean '" + nearest + "'?";
+  return nearest.empty() ? "; doc/parameters.md lists all parameters." : "; did you mean '" + nearest + "'?";
 }
 
 std::vector<std::string> Config::problems() const {
@@ -78,6 +78,7 @@ std::vector<std::string> Config::problems() const {
                        with_unit(range_text(info), info) + ".");
     }
   });
+  if (lanes > 1 && lanes < 16) faults.push_back("lanes is " + std::to_string(lanes) + ": it must be 0, 1 or 16.");
   if (z_max <= z_min) {
     faults.push_back("z_max is " + to_text(z_max) + " m, but z_min is " + to_text(z_min) + " m: z_max must be larger.");
   }
@@ -91,17 +92,24 @@ std::vector<std::string> Config::problems() const {
   return faults;
 }
 
+void ParameterTable::operator()(const FieldInfo& info, bool value) { add_row(info, to_text(value), ""); }
+void ParameterTable::operator()(const FieldInfo& info, int value) { add_row(info, to_text(value), range_text(info)); }
+void ParameterTable::operator()(const FieldInfo& info, double value) { add_row(info, to_text(value), range_text(info)); }
+void ParameterTable::operator()(const FieldInfo& info, const std::string& value) { add_row(info, value.empty() ? "\"\"" : value, ""); }
+
+void ParameterTable::add_row(const FieldInfo& info, const std::string& value, const std::string& range) {
+  if (text_.empty() || group_ != info.group) {
+    group_ = info.group;
+    text_ += "\n## " + group_ + "\n\n| parameter | default | unit | range | meaning |\n|---|---|---|---|---|\n";
+  }
+  text_ += std::string("| `") + info.name + "` | " + value + " | " + info.unit + " | " + range + " | " + info.meaning + " |\n";
+}
+
 std::string parameter_table() {
-  std::string table = "| parameter | default | unit | range | meaning |\n|---|---|---|---|---|\n";
+  ParameterTable table;
   const Config defaults;
-  for_each_field(defaults, [&](const FieldInfo& info, const auto& value) {
-    using Field = std::decay_t<decltype(value)>;
-    std::string shown = to_text(value);
-    if (shown.empty()) shown = "\"\"";
-    const std::string range = kIsNumber<Field> ? range_text(info) : "";
-    table += std::string("| `") + info.name + "` | " + shown + " | " + info.unit + " | " + range + " | " + info.meaning + " |\n";
-  });
-  return table;
+  for_each_field(defaults, table);
+  return table.text();
 }
 
 }  // namespace frontier_surfels

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "frontier_surfels/types.hpp"
+
 namespace frontier_surfels {
 
 Limits make_limits(const Config& config) {
@@ -13,6 +15,8 @@ Limits make_limits(const Config& config) {
   limits.split_radius = 2 * std::sqrt(3.0F);
   limits.create_radius = std::sqrt(3.0F) / 2;
   limits.normal_min = 0.01F;
+  limits.back_probe = static_cast<float>(kBackProbe);
+  limits.front_probe = static_cast<float>(kFrontProbe) * limits.create_radius;
   limits.min_gap = static_cast<float>(config.min_gap);
   limits.surface_depth = static_cast<float>(config.surface_depth);
   limits.median_votes = config.median_votes;

@@ -59,30 +59,20 @@ Eigen::Matrix3d projection(const Intrinsics& camera) {
   return K;
 }
 
-/// Writes a view into its lane of a group of LANES views.
+/// Writes a view into its lane of a group, lane[VIEW_LANE_FIELDS][VIEW_GROUP]. @param lane  the view's first number
 void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, std::uint32_t first_pixel, float* lane) {
-  const Eigen::Matrix3d R = T_view_camera.linear();
-  const Eigen::Vector3d t = T_view_camera.translation();
-  const double fields[VIEW_LANE_FIELDS - 1] = {R(0, 0),
-                                               R(0, 1),
-                                               R(0, 2),
-                                               R(1, 0),
-                                               R(1, 1),
-                                               R(1, 2),
-                                               R(2, 0),
-                                               R(2, 1),
-                                               R(2, 2),
-                                               t.x(),
-                                               t.y(),
-                                               t.z(),
-                                               camera.fx,
-                                               camera.fy,
-                                               camera.cx,
-                                               camera.cy,
-                                               static_cast<double>(camera.width),
-                                               static_cast<double>(camera.height)};
-  for (int n = 0; n < VIEW_LANE_FIELDS - 1; ++n) lane[n * LANES] = static_cast<float>(fields[n]);
-  std::memcpy(&lane[(VIEW_LANE_FIELDS - 1) * LANES], &first_pixel, sizeof(first_pixel));
+  const auto set = [lane](int field, double value) { lane[field * VIEW_GROUP] = static_cast<float>(value); };
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) set(VIEW_LANE_R00 + 3 * row + column, T_view_camera.linear()(row, column));
+    set(VIEW_LANE_T0 + row, T_view_camera.translation()[row]);
+  }
+  set(VIEW_LANE_FX, camera.fx);
+  set(VIEW_LANE_FY, camera.fy);
+  set(VIEW_LANE_CX, camera.cx);
+  set(VIEW_LANE_CY, camera.cy);
+  set(VIEW_LANE_WIDTH, camera.width);
+  set(VIEW_LANE_HEIGHT, camera.height);
+  std::memcpy(&lane[VIEW_LANE_FIRST_PIXEL * VIEW_GROUP], &first_pixel, sizeof(first_pixel));
 }
 
 /// An order of the kept views in which each is far from the ones before it. Then a few views already find most points that any view knows.
@@ -163,13 +153,13 @@ View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d:
 
 int RecentViews::prepare() {
   std::vector<View> views;
-  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * LANES, 0.0F);
+  std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * VIEW_GROUP, 0.0F);
   for (const std::size_t number : spread(kept_.size())) {
     const Kept& kept = kept_[number];
     const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
     const std::size_t n = views.size();
     views.push_back(to_view(kept, T_view_camera));
-    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / LANES * VIEW_LANE_FIELDS * LANES + n % LANES]);
+    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / VIEW_GROUP * VIEW_LANE_FIELDS * VIEW_GROUP + n % VIEW_GROUP]);
   }
   views_.send(std::move(views));
   view_lanes_.send(std::move(lanes));

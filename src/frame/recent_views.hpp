@@ -42,9 +42,9 @@ class RecentViews {
 
   const cl::Buffer& views() const { return views_(); }
   const cl::Buffer& depths() const { return depths_(); }
-  /// The views sent by prepare() in groups of LANES: [view_groups()][VIEW_LANE_FIELDS][LANES], filled up with zeros.
+  /// The views sent by prepare(), field by field in groups: [view_groups()][VIEW_LANE_FIELDS][VIEW_GROUP], filled up with zeros.
   const cl::Buffer& view_lanes() const { return view_lanes_(); }
-  std::size_t view_groups() const { return (kept_.size() + LANES - 1) / LANES; }
+  std::size_t view_groups() const { return (kept_.size() + VIEW_GROUP - 1) / VIEW_GROUP; }
   std::size_t count() const { return kept_.size(); }
 
  private:

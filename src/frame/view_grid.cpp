@@ -26,7 +26,7 @@ void set_footprints(const Axis& axis, int k, PixelRange* ranges) {
 }
 
 std::vector<PixelRange> find_pixels(const Axis& axis) {
-  const std::size_t layers = (axis.layers_k + 63) / 64 * 64, size = (axis.size + LANES - 1) / LANES * LANES;
+  const std::size_t layers = (axis.layers_k + 63) / 64 * 64, size = (axis.size + TABLE_CHUNK - 1) / TABLE_CHUNK * TABLE_CHUNK;
   std::vector<PixelRange> pixels(layers * size, PixelRange{0, 0});
   for (int k = axis.padding_k; k < axis.layers_k; ++k) set_footprints(axis, k, &pixels[k * size]);
   return pixels;
@@ -34,10 +34,10 @@ std::vector<PixelRange> find_pixels(const Axis& axis) {
 
 /// For each chunk of LANES voxels the words of 32 pixels in which its pixels lie.
 std::vector<PixelRange> find_words(const std::vector<PixelRange>& pixels) {
-  std::vector<PixelRange> words(pixels.size() / LANES, PixelRange{0, 0});
+  std::vector<PixelRange> words(pixels.size() / TABLE_CHUNK, PixelRange{0, 0});
   for (std::size_t n = 0; n < pixels.size(); ++n) {
     if (pixels[n][0] == pixels[n][1]) continue;
-    PixelRange& range = words[n / LANES];
+    PixelRange& range = words[n / TABLE_CHUNK];
     if (range[0] == range[1]) range[0] = pixels[n][0] / 32;
     range[1] = static_cast<std::uint16_t>((pixels[n][1] + 31) / 32);
   }

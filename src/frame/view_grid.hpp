@@ -15,12 +15,12 @@ namespace frontier_surfels {
 using PixelRange = std::array<std::uint16_t, 2>;
 
 /// The grid and its tables. For each voxel along i and j of the cuboid's layers they give the range of the working image's pixels whose
-/// samples lie in the voxel; the range may be empty. The tables have whole 64-bit words of layers and whole chunks of LANES voxels.
+/// samples lie in the voxel; the range may be empty. The tables have whole 64-bit words of layers and whole chunks of TABLE_CHUNK voxels.
 struct ViewGrid {
   Grid grid = {};
   std::vector<float> layer_depth;    ///< [size_k]: z of each layer's centre [m]
-  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][LANES]: range of columns for each voxel along i
-  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][LANES]: range of rows for each voxel along j
+  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][TABLE_CHUNK]: range of columns for each voxel along i
+  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][TABLE_CHUNK]: range of rows for each voxel along j
   std::vector<PixelRange> words_i;   ///< [layers][chunks]: range of 32-pixel words with the columns of a chunk
 };
 

@@ -93,8 +93,8 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
     p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
   const auto x = p.col(0), y = p.col(1), z = p.col(2);
   const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
-  constexpr double kRadiusRounding = 1.001;  // stored radii have 11 bits
-  constexpr double kMargin = 1.6;            // [voxel]; the kernel's margin of 1.5 and 0.1 for its rounding
+  constexpr double kRadiusRounding = 1.001;       // stored radii have 11 bits
+  constexpr double kMargin = REACH_MARGIN + 0.1;  // [voxel]; the kernel's margin, and 0.1 for the kernel's rounding
   const double reach = std::max(2 * kRadiusRounding * extent_.largest_radius / voxel_low, extent_.thickness) + kMargin;  // [voxel]
   if (z.maxCoeff() < -(grid_.padding_k + reach) * grid_.delta_min) return false;
   // The reach of surfels grows with their depth, but more slowly than the depth, so the nearest corner decides.

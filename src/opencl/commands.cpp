@@ -34,7 +34,7 @@ cl::Buffer allocate_on_host(const cl::Context& context, std::size_t bytes) {
 }
 
 cl::Program build(const Device& device) {
-  const std::string options = std::string("-cl-std=CL1.2 -Werror -DSIGN_FIELD_GROUP=") + (device.is_cpu ? "1 -DON_CPU" : "64");
+  const std::string options = build_options(device);
   cl::Program program(device.context, source());
   try {
     program.build({device.device}, options.c_str());
@@ -55,6 +55,11 @@ void retire(const cl::CommandQueue& queue, const Device& device) {
 }
 
 }  // namespace
+
+std::string build_options(const Device& device) {
+  return "-cl-std=CL1.2 -Werror -DLANES=" + std::to_string(device.lanes) +
+         (device.is_cpu ? " -DON_CPU -DSIGN_FIELD_GROUP=1" : " -DSIGN_FIELD_GROUP=64");
+}
 
 Commands::Commands(Device device) : device_(std::move(device)) {
   try {

@@ -13,6 +13,9 @@
 
 namespace frontier_surfels {
 
+/// Options with which the kernels are built for a device.
+std::string build_options(const Device& device);
+
 /// Builds all kernels once, launches them by name and records their times.
 class Commands {
  public:
@@ -22,6 +25,8 @@ class Commands {
   Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
+  std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
+  std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
   cl::CommandQueue& queue() { return queue_; }
 
   /// Launches a kernel with at least `items` work items in groups of `group`. Its device time counts towards `stage`.

@@ -111,6 +111,7 @@ Device choose_device(const Config& config) {
       chosen.context = cl::Context(chosen.device);
       chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
       chosen.is_cpu = chosen.device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU;
+      chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_cpu ? 16 : 1;
       chosen.prefers_one_item = chosen.is_cpu && candidate.platform == "Portable Computing Language";
       chosen.description = describe({candidate.platform, chosen.device});
       return chosen;

@@ -10,6 +10,7 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
+  int lanes = 1;                  ///< points that one work item handles at once: 16 or 1
   bool prefers_one_item = false;  ///< one work item does small jobs alone, because a launch costs more on PoCL; not on llvmpipe, which
                                   ///< ends loops after 65535 turns
   bool shares_memory = false;     ///< the device works in the host's memory
@@ -19,7 +20,7 @@ struct Device {
   std::size_t heavy_group() const { return is_cpu ? 1 : 64; }
 };
 
-/// Chooses the device by platform, device_type, device_index and threads of the configuration.
+/// Chooses the device by platform, device_type, device_index and threads of the configuration, and the lanes of its work items.
 /// @throws DeviceError  no device fits (the message lists all devices), or the device lacks something that the kernels need
 Device choose_device(const Config& config);
 

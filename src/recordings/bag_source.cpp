@@ -14,15 +14,15 @@ namespace {
 
 bool is_topic(const rosbag::ConnectionInfo& connection, const char* name) { return strip_slash(connection.topic) == name; }
 
-/// What rosbag's own messages leave open: what to do.
+/// Checks that the file is a bag. The messages are clearer than those of rosbag.
 void check_is_bag(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string start(13, '\0');
   file.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(file.gcount()));
   if (start.empty()) throw Error(path + " is empty or cannot be read: record or copy it again.");
-  if (start.compare(0, 8, "#ROSBAG ") != 0) throw Error(path + " is no bag of ROS 1: give a bag, or the folder of a recording.");
-  if (start != "#ROSBAG V2.0\n") throw Error(path + " is a bag of an old version: convert it with `rosbag fix`.");
+  if (start.compare(0, 8, "#ROSBAG ") != 0) throw Error(path + " is not a bag of ROS 1: give a bag, or the folder of a recording.");
+  if (start != "#ROSBAG V2.0\n") throw Error(path + " is a bag of an old format: convert it with `rosbag fix`.");
 }
 
 }  // namespace
@@ -84,21 +84,23 @@ void BagSource::read_transforms_and_cameras() {
       transforms_.add(*transforms, strip_slash(message.getTopic()) == "tf_static");
     } else if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
       cameras_.emplace_back(info->header.stamp, *info);
-      cameras_.back().second.header = std_msgs::Header();  // so that only cameras are compared below
+      cameras_.back().second.header = std_msgs::Header();  // so that only the cameras themselves are compared below
     }
   }
-  if (cameras_.empty()) throw Error(bag_.getFileName() + " has no message on " + topics_.info + ": the camera's intrinsics are not known.");
+  if (cameras_.empty())
+    throw Error(bag_.getFileName() + " has no message on " + topics_.info +
+                ", so that the camera's intrinsics are unknown: choose another topic with --info-topic.");
   const auto by_stamp = [](const auto& a, const auto& b) { return a.first < b.first; };
   const auto same_camera = [](const auto& a, const auto& b) { return a.second == b.second; };
   std::stable_sort(cameras_.begin(), cameras_.end(), by_stamp);
   cameras_.erase(std::unique(cameras_.begin(), cameras_.end(), same_camera), cameras_.end());
   if (transforms_.damaged() > 0) {
     notes_.push_back(std::to_string(transforms_.damaged()) +
-                     " transforms of the bag are damaged (not finite, no rotation, or no names) and left out.");
+                     " transforms of the bag are left out, because they are not finite, no rotations, or without names.");
   }
 }
 
-/// Poses that are missing in the whole bag are found out here, with a sentence that says which ones there are.
+/// Chooses the world frame. A bag without transforms to it is refused here, with a list of the transforms that exist.
 void BagSource::choose_world(const std::string& wanted) {
   const ImageMessage first = to_image_message(*depth_view_->begin());
   if (!first) throw Error(bag_.getFileName() + " has no images on " + topics_.depth + ".");
@@ -106,9 +108,11 @@ void BagSource::choose_world(const std::string& wanted) {
   world_ = strip_slash(wanted);
   if (world_.empty()) world_ = transforms_.root_of(camera);
   if (world_ == camera)
-    throw Error("The world frame '" + world_ + "' is that of the depth images themselves: choose the one the camera moves in.");
+    throw Error("The world frame '" + world_ +
+                "' is the frame of the depth images themselves: choose the frame in which the camera moves.");
   if (!transforms_.knows(world_)) {
-    throw Error(bag_.getFileName() + " has no transform with the frame '" + world_ + "'; there are: " + transforms_.frames() + ".");
+    throw Error(bag_.getFileName() + " has no transform with the frame '" + world_ + "'; its transforms are: " + transforms_.frames() +
+                ".");
   }
 }
 
@@ -117,7 +121,7 @@ std::optional<RecordedFrame> BagSource::next() {
     const rosbag::MessageInstance& message = message_.emplace(*next_depth_);
     const std::size_t index = selection_.first + done_ * selection_.stride;
     if (++done_ < selection_.count) std::advance(next_depth_, static_cast<std::ptrdiff_t>(selection_.stride));
-    const std::string frame = "Frame " + std::to_string(index) + " of " + topics_.depth + " is passed over: ";
+    const std::string frame = "Frame " + std::to_string(index) + " of " + topics_.depth + " is skipped: ";
     try {
       return read(message);
     } catch (const BadFrame& fault) {
@@ -143,7 +147,7 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   return frame;
 }
 
-/// From the latest camera_info at or before the stamp, else the first.
+/// The intrinsics of the latest camera_info at or before the stamp, or of the first one if there is none.
 Intrinsics BagSource::intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const {
   auto camera = std::upper_bound(cameras_.begin(), cameras_.end(), stamp,
                                  [](const ros::Time& value, const auto& element) { return value < element.first; });
@@ -151,7 +155,7 @@ Intrinsics BagSource::intrinsics_at(const ros::Time& stamp, const cv::Size& imag
   return messages::to_intrinsics(camera->second, image_size);
 }
 
-/// Colour is an extra: what is wrong with it costs no frame.
+/// The colour image of a frame, or an empty one. A fault of a colour image never drops a frame.
 cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) {
   const std::string without = ": their frames are used without colour.";
   try {

@@ -1,4 +1,4 @@
-/// Recordings of ROS: bags, read without a master.
+/// Reads bags of ROS 1, without a ROS master.
 #pragma once
 
 #include <rosbag/bag.h>
@@ -18,12 +18,12 @@
 
 namespace frontier_surfels::replay {
 
-/// Images of one topic in the order of the bag. Only the few around the last stamp asked for are kept in memory.
+/// The images of one topic in the order of the bag. Only the few near the last requested stamp are kept in memory.
 class ImageWindow {
  public:
   ImageWindow(const rosbag::Bag& bag, const std::string& topic);
 
-  /// The image nearest to `stamp`; empty if none is within the tolerance. Stamps must not decrease from call to call.
+  /// The image nearest to `stamp`, or an empty one if none is within the tolerance. Stamps must not decrease from call to call.
   ImageMessage nearest(const ros::Time& stamp);
 
  private:
@@ -32,7 +32,7 @@ class ImageWindow {
   std::deque<ImageMessage> window_;
 };
 
-/// Reads all transforms and cameras when it is opened, images one by one afterwards.
+/// Reads all transforms and cameras in the constructor, and the images one by one afterwards.
 class BagSource : public FrameSource {
  public:
   BagSource(const std::string& path, const SourceOptions& options);
@@ -45,7 +45,7 @@ class BagSource : public FrameSource {
   const rosbag::Bag& bag() const { return bag_; }
   const BagTopics& topics() const { return topics_; }
 
-  /// The depth message of the frame that next() gave last.
+  /// The depth message of the last frame of next().
   const rosbag::MessageInstance& message() const { return *message_; }
 
  private:
@@ -60,14 +60,14 @@ class BagSource : public FrameSource {
   rosbag::Bag bag_;
   BagTopics topics_;
   BagTransforms transforms_;
-  std::vector<std::pair<ros::Time, sensor_msgs::CameraInfo>> cameras_;  ///< by stamp; only where it changes
+  std::vector<std::pair<ros::Time, sensor_msgs::CameraInfo>> cameras_;  ///< in order of stamps; repeated cameras are left out
   std::string world_;
   std::unique_ptr<rosbag::View> depth_view_;
   rosbag::View::iterator next_depth_;
   std::optional<rosbag::MessageInstance> message_;
   std::unique_ptr<ImageWindow> color_images_;
   Selection selection_;
-  std::size_t done_ = 0;  ///< of the selection
+  std::size_t done_ = 0;  ///< frames of the selection that are read
   std::vector<std::string> skipped_;
   std::vector<std::string> notes_;
 };

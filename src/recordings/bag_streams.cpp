@@ -33,7 +33,7 @@ tf2_msgs::TFMessage TransformStream::take(const ros::Time& until) {
     const auto message = messages_.take().instantiate<tf2_msgs::TFMessage>();
     if (message) all.transforms.insert(all.transforms.end(), message->transforms.begin(), message->transforms.end());
   }
-  for (geometry_msgs::TransformStamped& transform : all.transforms) normalise(transform.transform.rotation);  // as offline
+  for (geometry_msgs::TransformStamped& transform : all.transforms) normalise(transform.transform.rotation);  // as BagTransforms does
   return all;
 }
 
@@ -61,7 +61,7 @@ std::vector<rosbag::MessageInstance> ColorStream::take(const ros::Time& stamp) {
     ImageMessage image;
     try {
       image = to_image_message(message);
-    } catch (const ros::Exception&) {  // colour is an extra: the bag's damage costs no frame
+    } catch (const ros::Exception&) {  // a damaged colour image never drops a frame
     }
     if (!image) continue;
     known_until_ = image.header().stamp;

@@ -1,4 +1,4 @@
-/// What of a bag belongs to a frame that is played, beside its depth image. No ROS communication in it.
+/// Selects the messages of a bag that a replayed frame needs beside its depth image. Nothing is published here.
 #pragma once
 
 #include <rosbag/bag.h>
@@ -13,7 +13,7 @@
 
 namespace frontier_surfels::replay {
 
-/// Messages of some of a bag's topics, from the first to the last.
+/// The messages of some topics of a bag, from the first to the last.
 class BagStream {
  public:
   BagStream(const rosbag::Bag& bag, const std::function<bool(const std::string&)>& is_wanted);
@@ -27,25 +27,25 @@ class BagStream {
   rosbag::View::iterator next_;
 };
 
-/// Transforms, in one message each time: a second's messages in one go would overrun the queues of those who listen.
+/// Transforms, joined to one message for each call: a second's separate messages at once would overflow the queues of subscribers.
 class TransformStream {
  public:
   /// @param topic  tf or tf_static, with or without a slash
   TransformStream(const rosbag::Bag& bag, const std::string& topic);
 
-  /// All up to this time of the bag that have not been taken so far.
+  /// All transforms up to this time of the bag, except those taken before.
   tf2_msgs::TFMessage take(const ros::Time& until);
 
  private:
   BagStream messages_;
 };
 
-/// Cameras of frames whose stamps do not decrease.
+/// The cameras of frames, in order of the frames.
 class CameraStream {
  public:
   CameraStream(const rosbag::Bag& bag, const std::string& topic);
 
-  /// The last camera_info up to the stamp, or else the first one; empty if it is known already.
+  /// The last camera_info up to the stamp, or the first one if there is none; empty if it was returned before. Stamps must not decrease.
   std::optional<rosbag::MessageInstance> take(const ros::Time& stamp);
 
  private:
@@ -53,12 +53,13 @@ class CameraStream {
   bool is_known_ = false;
 };
 
-/// Colour images of frames whose stamps do not decrease.
+/// The colour images of frames, in order of the frames.
 class ColorStream {
  public:
   ColorStream(const rosbag::Bag& bag, const std::string& topic);
 
-  /// The last one before the stamp and the first one from it on, those known already left out: the nearest is one of the two.
+  /// The last image before the stamp and the first one after it, of which one is the nearest, except those returned before. Stamps must
+  /// not decrease.
   std::vector<rosbag::MessageInstance> take(const ros::Time& stamp);
 
  private:

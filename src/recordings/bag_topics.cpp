@@ -53,7 +53,7 @@ std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& m
   const bool compressed = static_cast<bool>(message.compressed);
   try {
     return ImageTopic{name, compressed, true, messages::depth_image(message).size()};
-  } catch (const BadFrame&) {  // no depth: colour, perhaps
+  } catch (const BadFrame&) {  // no depth image, but perhaps a colour image
   }
   try {
     return ImageTopic{name, compressed, false, messages::color_image(message).size()};
@@ -62,7 +62,7 @@ std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& m
   }
 }
 
-/// Looks at a topic's first message, or the next ones as long as they are damaged.
+/// Looks at the first message of a topic, or at the next ones if it is damaged.
 std::optional<ImageTopic> look_at(const rosbag::Bag& bag, const std::string& name) {
   rosbag::View view(bag, rosbag::TopicQuery(name));
   int tries = 10;
@@ -72,14 +72,14 @@ std::optional<ImageTopic> look_at(const rosbag::Bag& bag, const std::string& nam
   return std::nullopt;
 }
 
-/// Keeps those that satisfy `wanted`, if there are any.
+/// Keeps only the topics that satisfy `wanted`, unless there are none.
 template <typename Predicate>
 void prefer(std::vector<ImageTopic>& topics, Predicate wanted) {
   if (std::none_of(topics.begin(), topics.end(), wanted)) return;
   topics.erase(std::remove_if(topics.begin(), topics.end(), [&](const ImageTopic& topic) { return !wanted(topic); }), topics.end());
 }
 
-/// Drops compressed topics whose raw image is there as well.
+/// Drops compressed topics whose raw images are in the bag as well.
 void drop_duplicates(std::vector<ImageTopic>& topics) {
   const std::vector<ImageTopic> all = topics;
   prefer(topics, [&](const ImageTopic& topic) {
@@ -108,7 +108,7 @@ class Finder {
     drop_duplicates(found);
     if (found.empty()) {
       throw Error(bag_.getFileName() +
-                  " has no depth images (16UC1, mono16, 32FC1, 16-bit PNG); its image topics: " + listed(names_of(images_)) + ".");
+                  " has no depth images (16UC1, mono16, 32FC1, 16-bit PNG); its image topics are: " + listed(names_of(images_)) + ".");
     }
     if (found.size() > 1) throw_ambiguous("depth", names_of(found));
     return found.front();
@@ -125,7 +125,7 @@ class Finder {
       candidates.push_back(topic);
     }
     throw Error(bag_.getFileName() + " has no " + kInfoType + " on " + name +
-                "; choose the topic with --info-topic; there are: " + listed(candidates) + ".");
+                "; choose the topic with --info-topic; the candidates are: " + listed(candidates) + ".");
   }
 
   std::string color(const std::string& wanted, const ImageTopic& depth) const {
@@ -146,7 +146,8 @@ class Finder {
     for (const ImageTopic& topic : images_) {
       if (strip_slash(topic.name) == strip_slash(wanted)) return topic;
     }
-    throw Error(bag_.getFileName() + " has no " + what + " images on " + wanted + "; its image topics: " + listed(names_of(images_)) + ".");
+    throw Error(bag_.getFileName() + " has no " + what + " images on " + wanted + "; its image topics are: " + listed(names_of(images_)) +
+                ".");
   }
 
   [[noreturn]] void throw_ambiguous(const std::string& what, const std::vector<std::string>& names) const {

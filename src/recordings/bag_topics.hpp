@@ -13,18 +13,18 @@ namespace frontier_surfels::replay {
 
 using messages::ImageMessage;
 
-/// Names as they stand in the bag.
+/// Names of topics, as they are written in the bag.
 struct BagTopics {
   std::string depth;
   std::string info;
   std::string color;  ///< empty where there is none
 };
 
-/// Takes the topics named in `options`; finds the others by their names, types and first messages.
-/// @throws Error that lists the candidates if one is missing or there are several
+/// Uses the topics named in `options`, and finds the others by their names, types and first messages.
+/// @throws Error if a topic is missing, or there are several candidates; it lists them
 BagTopics find_topics(const rosbag::Bag& bag, const SourceOptions& options);
 
-/// The image of a bag's message; an empty one if it is of another type.
+/// The image of a message of a bag; empty if the message has another type.
 ImageMessage to_image_message(const rosbag::MessageInstance& message);
 
 }  // namespace frontier_surfels::replay

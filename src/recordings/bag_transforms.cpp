@@ -29,7 +29,7 @@ bool is_usable(const geometry_msgs::TransformStamped& transform) {
 
 void normalise(geometry_msgs::Quaternion& q) {
   const double norm = Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm(), deviation = std::abs(norm - 1);
-  const bool is_rounding = deviation < 1e-6;  // stays bit for bit
+  const bool is_rounding = deviation < 1e-6;  // is left as it is
   if (is_rounding || !(deviation <= kQuaternionTolerance)) return;
   q.x /= norm;
   q.y /= norm;
@@ -62,7 +62,8 @@ std::string BagTransforms::root_of(const std::string& frame) const {
   std::set<std::string> passed;  // a broken tree may have loops
   std::string root = frame;
   for (auto it = parent_of_.find(root); it != parent_of_.end() && passed.insert(root).second; it = parent_of_.find(root)) root = it->second;
-  if (root == frame) throw Error("No transform in /tf or /tf_static has '" + frame + "' as its child; there are: " + frames() + ".");
+  if (root == frame)
+    throw Error("No transform in /tf or /tf_static has '" + frame + "' as its child; the transforms are: " + frames() + ".");
   return root;
 }
 
@@ -81,7 +82,7 @@ std::string BagTransforms::frames() const {
 }
 
 Eigen::Isometry3d BagTransforms::T_world_frame(const std::string& world, const std::string& frame, const ros::Time& stamp) const {
-  if (stamp.isZero()) throw BadFrame("its stamp is 0, which is no time");
+  if (stamp.isZero()) throw BadFrame("its stamp is 0, which is not a valid time");
   if (frame == world) throw BadFrame("its frame is the world frame '" + world + "' itself");
   try {
     return messages::to_isometry(buffer_.lookupTransform(world, frame, stamp).transform);

@@ -24,14 +24,14 @@ namespace {
 namespace encodings = sensor_msgs::image_encodings;
 constexpr float kMillimetresPerMetre = 1000.0f;
 
-/// The inverse depth's resolution is that of 16 bits from 1 m on; compressed_depth_image_transport's own choice.
+/// The parameters of inverse depth that compressed_depth_image_transport itself uses.
 InverseDepthQuantisation default_quantisation() {
   constexpr float kLargestDepth = 10, kQuantisation = 100;
   const float a = kQuantisation * (kQuantisation + 1);
   return {a, 1 - a / kLargestDepth};
 }
 
-/// REP 118: no measurement is NaN.
+/// Depth as CV_32FC1 [m], where NaN means no measurement (REP 118).
 cv::Mat to_metres(const cv::Mat& depth) {
   if (depth.type() == CV_32FC1) return depth;
   cv::Mat metres(depth.size(), CV_32FC1);
@@ -41,7 +41,7 @@ cv::Mat to_metres(const cv::Mat& depth) {
   return metres;
 }
 
-/// 16 bits of `value`; 0, no measurement, for what they cannot hold.
+/// `value` as 16 bits, or 0 (no measurement) if it does not fit.
 std::uint16_t to_sixteen_bits(float value) {
   return std::isfinite(value) && value > 0 && value < 65535.5f ? static_cast<std::uint16_t>(std::lround(value)) : 0;
 }
@@ -99,8 +99,8 @@ struct Link {
   Eigen::Isometry3d T_parent_child;
 };
 
-/// From the tracked body to the optical frame. The numbers are those of a plausible mount: a camera a few centimetres from the body's
-/// centre, and the turn from x forward to z forward.
+/// The chain of frames from the tracked body to the optical frame. The numbers are made up but plausible: the camera sits a few centimetres
+/// from the centre of the body, and the optical frame has z forward instead of x.
 std::vector<Link> constant_links() {
   const Eigen::Isometry3d optical(Eigen::Quaterniond(-0.5, 0.5, -0.5, 0.5));
   return {{"kinect", "openni_camera", Eigen::Isometry3d(Eigen::Translation3d(0.03125, 0, 0.0625))},
@@ -188,7 +188,7 @@ class Writer {
     return message;
   }
 
-  /// `rosbag play` gives it to those who subscribe later, too.
+  /// With this header `rosbag play` publishes the message latched, so that late subscribers get it as well.
   static boost::shared_ptr<ros::M_string> latched_header() {
     namespace traits = ros::message_traits;
     return boost::make_shared<ros::M_string>(ros::M_string{{"latching", "1"},
@@ -216,7 +216,7 @@ void check(const BagOptions& options) {
 ros::Time to_ros_time(double stamp) {
   if (!(stamp > 0) || stamp >= std::numeric_limits<std::uint32_t>::max()) {
     throw Error("The stamp " + std::to_string(stamp) +
-                " s is no time of ROS, which has them above 0 and below 2^32: correct the recording's stamps.");
+                " s is not a valid time of ROS, which must be above 0 and below 2^32 s: correct the stamps of the recording.");
   }
   return ros::Time(stamp);
 }
@@ -235,7 +235,8 @@ BagSummary write_bag(FrameSource& source, const std::string& path, const BagOpti
       ++summary.frames;
     }
     writer.close();
-    if (summary.frames == 0) throw Error("None of the recording's frames can be used: no bag is written.");
+    if (summary.frames == 0)
+      throw Error("No frame of the recording can be used, so no bag is written: check the recording with replay_score.");
     std::filesystem::rename(temporary, path);
   } catch (const std::exception& error) {
     std::error_code ignored;

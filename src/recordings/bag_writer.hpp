@@ -8,17 +8,18 @@
 
 namespace frontier_surfels::replay {
 
-/// Topics and frames are those of the TUM RGB-D benchmark's bags, leading slashes included.
+/// By default, topics and tf frames are those of the TUM RGB-D benchmark's bags, with leading slashes.
 struct BagOptions {
   std::string depth_topic = "/camera/depth/image";
   std::string depth_info_topic = "/camera/depth/camera_info";
   std::string color_topic = "/camera/rgb/image_color";
   std::string color_info_topic = "/camera/rgb/camera_info";
-  std::string encoding = "32FC1";   ///< of depth: 32FC1 [m], or 16UC1 [mm]
-  bool compressed = false;          ///< compressedDepth (16UC1 without loss; 32FC1 quantised, up to 10 m) and JPEG on topics named after it
+  std::string encoding = "32FC1";  ///< of depth images: 32FC1 [m] or 16UC1 [mm]
+  bool compressed =
+      false;  ///< writes compressedDepth (16UC1 lossless; 32FC1 quantised, up to 10 m) and JPEG, on topics with these suffixes
   std::string compression = "lz4";  ///< of the bag: none, lz4, bz2
-  bool leading_slashes = true;      ///< of frame names
-  bool static_transforms = false;   ///< constant transforms go to /tf_static, latched; else to /tf, with each frame
+  bool leading_slashes = true;      ///< of the names of tf frames
+  bool static_transforms = false;   ///< writes constant transforms once to /tf_static, latched; else to /tf with each frame
 };
 
 struct BagSummary {
@@ -26,9 +27,8 @@ struct BagSummary {
   double stamp_shift = 0;  ///< [s] added to all stamps
 };
 
-/// Writes what is left of `source` to `path`, through a temporary file beside it.
-/// ROS has no time 0 (tf takes it for "the latest"): where the first stamp is below 1 s, all are shifted by 1 s, or by as many whole
-/// seconds as bring it above.
+/// Writes the remaining frames of `source` to `path`, through a temporary file beside it. ROS has no time 0, which tf takes for "the
+/// latest": if the first stamp is below 1 s, all stamps are shifted by whole seconds, so that the first one is 1 s or more.
 /// @throws Error
 BagSummary write_bag(FrameSource& source, const std::string& path, const BagOptions& options = {});
 

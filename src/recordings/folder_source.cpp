@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kAssociationTolerance = 0.020;  // [s]
-constexpr double kQuaternionTolerance = 1e-2;    // a norm further from 1 is no rounding
+constexpr double kQuaternionTolerance = 1e-2;    // largest difference of the norm from 1 that can be rounding
 constexpr float kTumUnitsPerMetre = 5000.0f;
 
 bool is_image(const fs::path& path) {
@@ -25,7 +25,8 @@ bool is_number(const fs::path& path) {
   return stem.find_first_not_of("0123456789") == std::string::npos;
 }
 
-/// Images of a folder in the order of their names; names that are all numbers in the order of the numbers, padded with zeros or not.
+/// The images of a folder in the order of their names. If all names are numbers, the order is that of the numbers, with or without zeros
+/// in front.
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
@@ -45,7 +46,7 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-/// An image, or an empty one whatever is wrong with the file.
+/// Reads an image. Returns an empty one if that fails for whatever reason.
 cv::Mat read_image(const fs::path& path, int flags) {
   try {
     return cv::imread(path.string(), flags);
@@ -54,7 +55,7 @@ cv::Mat read_image(const fs::path& path, int flags) {
   }
 }
 
-/// @throws BadFrame if the numbers are no pose
+/// @throws BadFrame if the numbers are not a pose
 Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
   if (numbers.empty()) {
     throw BadFrame("no pose lies within " + std::to_string(std::lround(kAssociationTolerance * 1e3)) + " ms of its stamp");
@@ -64,12 +65,12 @@ Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
   }
   const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
-    throw BadFrame("its pose's quaternion has the length " + std::to_string(rotation.norm()) + " instead of 1");
+    throw BadFrame("the quaternion of its pose has the length " + std::to_string(rotation.norm()) + " instead of 1");
   }
   return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
 }
 
-/// The element of `sorted` (by stamp) nearest to `stamp`; null if none is within the tolerance.
+/// The element nearest to `stamp` in a list sorted by stamp, or null if none is within the tolerance.
 template <typename T>
 const T* nearest(const std::vector<T>& sorted, double stamp) {
   auto after = std::lower_bound(sorted.begin(), sorted.end(), stamp, [](const T& element, double value) { return element.stamp < value; });
@@ -94,7 +95,7 @@ FolderSource::FolderSource(const fs::path& folder, const SourceOptions& options)
     list_tum_images();
   } else {
     throw Error(folder.string() +
-                " is no recording: it needs depth/, poses.txt and camera.txt, or TUM RGB-D's depth.txt and groundtruth.txt.");
+                " is not a recording: a folder needs depth/, poses.txt and camera.txt, or TUM RGB-D's depth.txt and groundtruth.txt.");
   }
   selection_ = select_frames(options, entries_.size(), folder.string());
 }
@@ -141,7 +142,7 @@ void FolderSource::list_tum_images() {
   }
 }
 
-/// The calibration that the benchmark publishes for the camera named in the folder's name.
+/// Uses the calibration that TUM publishes for the camera in the folder's name.
 void FolderSource::choose_tum_camera() {
   const struct {
     const char* name;
@@ -156,12 +157,12 @@ void FolderSource::choose_tum_camera() {
     if (name.find(camera.name) == std::string::npos && name.find(camera.short_name) == std::string::npos) continue;
     intrinsics_ = camera.intrinsics;
     notes_.push_back("There is no camera.txt in " + folder_.string() + ": TUM's calibration of " + camera.name +
-                     " is used, as the folder's name says.");
+                     " is used, because the folder's name contains it.");
     return;
   }
   throw Error(folder_.string() +
-              " has no camera.txt, and its name says none of freiburg1, freiburg2, freiburg3: write the line `fx fy cx cy width height` "
-              "into camera.txt.");
+              " has no camera.txt, and its name contains none of freiburg1, freiburg2, freiburg3: write a file camera.txt with the line "
+              "`fx fy cx cy width height`.");
 }
 
 std::optional<RecordedFrame> FolderSource::next() {
@@ -170,7 +171,7 @@ std::optional<RecordedFrame> FolderSource::next() {
     try {
       return read(entry);
     } catch (const BadFrame& fault) {
-      skipped_.push_back("Frame " + entry.depth.string() + " is passed over: " + fault.what() + ".");
+      skipped_.push_back("Frame " + entry.depth.string() + " is skipped: " + fault.what() + ".");
     }
   }
   return std::nullopt;
@@ -182,13 +183,13 @@ RecordedFrame FolderSource::read(const Entry& entry) {
   frame.stamp = entry.stamp;
   frame.T_world_camera = to_pose(entry.pose);
   frame.intrinsics = intrinsics_;
-  if (!fs::exists(entry.depth)) throw BadFrame("there is no such image");
+  if (!fs::exists(entry.depth)) throw BadFrame("there is no such file");
   frame.depth = read_image(entry.depth, cv::IMREAD_UNCHANGED);
   if (frame.depth.empty()) throw BadFrame("the image cannot be read");
-  if (frame.depth.type() != CV_16UC1) throw BadFrame("the image does not have one channel of 16 bits");
+  if (frame.depth.type() != CV_16UC1) throw BadFrame("the image must have one channel of 16 bits");
   if (frame.depth.size() != cv::Size(intrinsics_.width, intrinsics_.height)) {
     throw BadFrame("the image has " + std::to_string(frame.depth.cols) + "x" + std::to_string(frame.depth.rows) +
-                   " pixels, but the camera " + std::to_string(intrinsics_.width) + "x" + std::to_string(intrinsics_.height));
+                   " pixels, but camera.txt says " + std::to_string(intrinsics_.width) + "x" + std::to_string(intrinsics_.height));
   }
   if (tum_layout_) {
     cv::Mat metres(frame.depth.size(), CV_32FC1);
@@ -200,7 +201,7 @@ RecordedFrame FolderSource::read(const Entry& entry) {
   return frame;
 }
 
-/// Colour is an extra: what is wrong with it costs no frame.
+/// The colour image of a frame, or an empty one. A fault of a colour image never drops a frame.
 cv::Mat FolderSource::read_color(const Entry& entry, const cv::Size& size) {
   const cv::Mat color = read_image(entry.color, cv::IMREAD_COLOR);
   if (color.size() == size) return color;

@@ -1,4 +1,4 @@
-/// Sequences kept as images and text files in a folder.
+/// Reads recordings that are folders of images and text files.
 #pragma once
 
 #include <filesystem>
@@ -10,9 +10,9 @@
 
 namespace frontier_surfels::replay {
 
-/// Reads either of two layouts:
+/// A folder has one of two layouts:
 ///   depth/NAME.png (16 bit, mm) + poses.txt + camera.txt, optionally color/NAME.jpg or .png
-///   TUM RGB-D: depth.txt + groundtruth.txt (images of 16 bit, 5000 a metre), optionally rgb.txt and camera.txt
+///   TUM RGB-D: depth.txt + groundtruth.txt (16-bit images, 5000 units for a metre), optionally rgb.txt and camera.txt
 /// poses.txt and groundtruth.txt have lines `stamp tx ty tz qx qy qz qw`, camera to world, optical frame; camera.txt has `fx fy cx cy width
 /// height`.
 class FolderSource : public FrameSource {
@@ -25,12 +25,12 @@ class FolderSource : public FrameSource {
   const std::vector<std::string>& notes() const override { return notes_; }
 
  private:
-  /// What belongs together, before any image is read.
+  /// The files and the pose of a frame, before any image is read.
   struct Entry {
     double stamp = 0;  ///< [s]
     std::filesystem::path depth;
-    std::filesystem::path color;  ///< empty where there is none
-    std::vector<double> pose;     ///< tx ty tz qx qy qz qw as recorded; empty where there is none
+    std::filesystem::path color;  ///< empty if there is none
+    std::vector<double> pose;     ///< tx ty tz qx qy qz qw as recorded; empty if there is none
   };
 
   void list_numbered_images();
@@ -44,7 +44,7 @@ class FolderSource : public FrameSource {
   Intrinsics intrinsics_;
   bool tum_layout_ = false;
   Selection selection_;
-  std::size_t done_ = 0;  ///< of the selection
+  std::size_t done_ = 0;  ///< frames of the selection that are read
   std::vector<std::string> skipped_;
   std::vector<std::string> notes_;
 };

@@ -16,7 +16,7 @@ Selection select_frames(const SourceOptions& options, std::size_t frames, const 
   if (options.first < 0) throw Error("The first frame must be 0 or more, not " + std::to_string(options.first) + ".");
   if (options.last < -1 || (options.last != -1 && options.last < options.first)) {
     throw Error("The last frame (" + std::to_string(options.last) + ") must not be before the first (" + std::to_string(options.first) +
-                "); -1 is the end.");
+                "); -1 stands for the end.");
   }
   if (frames == 0) throw Error(path + " has no frames.");
 
@@ -39,7 +39,7 @@ std::unique_ptr<FrameSource> open_source(const std::string& path, const SourceOp
 #ifdef FRONTIER_SURFELS_WITH_ROS
   return std::make_unique<BagSource>(path, options);
 #else
-  throw Error(path + " is a file, and bags cannot be read as this was built without ROS: give a folder, or build with ROS.");
+  throw Error(path + " is a file, but this program was built without ROS and cannot read bags: give a folder, or build with ROS.");
 #endif
 }
 

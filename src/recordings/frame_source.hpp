@@ -1,4 +1,4 @@
-/// Recorded frames one after the other, whatever they were recorded in.
+/// Reads recorded frames one after the other, from any format. A new format is a new FrameSource that open_source() chooses.
 #pragma once
 
 #include <memory>
@@ -10,32 +10,32 @@
 
 namespace frontier_surfels::replay {
 
-/// Which part of a recording is read, and where its data are found in a bag.
+/// Which part of a recording is read, and where a bag has the data.
 struct SourceOptions {
   int first = 0;            ///< index of the first frame
   int last = -1;            ///< index of the last frame; -1: the end
-  int stride = 1;           ///< every so many frames
-  std::string depth_topic;  ///< bags; empty: found by name and type, or an Error that lists the candidates
-  std::string info_topic;   ///< bags; empty: camera_info beside the depth image
-  std::string color_topic;  ///< bags; empty: found by name and type; "none": no colour
-  std::string world_frame;  ///< bags; empty: the root of the tf tree
+  int stride = 1;           ///< every stride-th frame is read
+  std::string depth_topic;  ///< in bags; empty: found by name and type
+  std::string info_topic;   ///< in bags; empty: camera_info in the namespace of the depth images
+  std::string color_topic;  ///< in bags; empty: found by name and type; "none": no colour
+  std::string world_frame;  ///< in bags; empty: the root of the tf tree
 };
 
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// Frames that next() will be asked for, after first, last and stride; the unusable ones among them are counted as well.
+  /// Number of frames that the options select, including those that turn out to be unusable.
   virtual std::size_t size() const = 0;
-  /// The next usable frame; empty at the end. Frames that cannot be used are passed over and counted in skipped().
+  /// The next usable frame; empty at the end. Frames that cannot be used are skipped, and skipped() gets a sentence for each.
   virtual std::optional<RecordedFrame> next() = 0;
-  /// Why frames were passed over: a sentence each.
+  /// A sentence for each frame that was skipped: why it cannot be used.
   virtual const std::vector<std::string>& skipped() const = 0;
-  /// What was chosen or assumed where the recording does not say it, and colour images that could not be used: a sentence each.
+  /// Sentences about what was chosen or assumed because the recording does not say it, and about colour images that cannot be used.
   virtual const std::vector<std::string>& notes() const = 0;
 };
 
 /// Opens a folder (depth/ + poses.txt + camera.txt, colour optional; or TUM RGB-D: depth.txt + groundtruth.txt, rgb.txt optional) or a bag.
-/// @throws Error: a sentence that names what is missing
+/// @throws Error that says what is missing
 std::unique_ptr<FrameSource> open_source(const std::string& path, const SourceOptions& options = {});
 
 }  // namespace frontier_surfels::replay

@@ -1,4 +1,4 @@
-/// Which frames of a recording are read.
+/// The frames of a recording that are read.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +8,15 @@
 
 namespace frontier_surfels::replay {
 
-/// Frames first, first + stride, ... of a recording: `count` of them.
+/// The `count` frames first, first + stride, first + 2 stride, ... of a recording.
 struct Selection {
   std::size_t first = 0;
   std::size_t count = 0;
   std::size_t stride = 1;
 };
 
-/// Applies first, last and stride to a recording of `frames` frames. @throws Error if nothing is left, or the options make no sense
+/// Applies first, last and stride to a recording of `frames` frames. @throws Error if no frame is
+/// left, or the options contradict each other
 Selection select_frames(const SourceOptions& options, std::size_t frames, const std::string& path);
 
 }  // namespace frontier_surfels::replay

@@ -9,7 +9,7 @@ namespace frontier_surfels::replay {
 namespace {
 
 struct Line {
-  std::string where;  ///< file and line, for people
+  std::string where;  ///< file and number of the line, for messages
   std::vector<std::string> words;
 };
 
@@ -27,7 +27,7 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
   return lines;
 }
 
-/// Unlike a stream, takes nan and inf, which trackers write for a pose that was lost.
+/// Accepts nan and inf, unlike a stream: trackers write them where they have lost the camera.
 double to_number(const Line& line, std::size_t index) {
   const std::string& word = line.words[index];
   char* end = nullptr;
@@ -38,7 +38,7 @@ double to_number(const Line& line, std::size_t index) {
 
 void expect_words(const Line& line, std::size_t count, const char* form) {
   if (line.words.size() == count) return;
-  throw Error(line.where + " has " + std::to_string(line.words.size()) + " entries; the form is `" + form + "`.");
+  throw Error(line.where + " has " + std::to_string(line.words.size()) + " entries, but must have the form `" + form + "`.");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// The text files of recorded sequences: one record a line, '#' starts a comment.
+/// Reads the text files of recordings: a record in each line; '#' starts a comment.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@ namespace frontier_surfels::replay {
 
 struct StampedPose {
   double stamp = 0;          ///< [s]
-  std::vector<double> pose;  ///< tx ty tz [m] qx qy qz qw, as written: may be NaN
+  std::vector<double> pose;  ///< tx ty tz [m] qx qy qz qw, not checked: may be NaN
 };
 
 struct StampedFile {
@@ -19,13 +19,13 @@ struct StampedFile {
   std::string file;
 };
 
-/// Lines `stamp tx ty tz qx qy qz qw`. @throws Error naming the line that is something else
+/// Reads lines `stamp tx ty tz qx qy qz qw`. @throws Error that names the first line of another form
 std::vector<StampedPose> read_poses(const std::filesystem::path& path);
 
-/// Lines `stamp file`. @throws Error naming the line that is something else
+/// Reads lines `stamp file`. @throws Error that names the first line of another form
 std::vector<StampedFile> read_file_list(const std::filesystem::path& path);
 
-/// One line `fx fy cx cy width height`. @throws Error
+/// Reads a file with the one line `fx fy cx cy width height`. @throws Error if it has another form
 Intrinsics read_camera(const std::filesystem::path& path);
 
 }  // namespace frontier_surfels::replay

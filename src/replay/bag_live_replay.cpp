@@ -15,13 +15,13 @@ using messages::strip_slash;
 
 namespace {
 
-const ros::Duration kTransformsAhead(1);  // of the frame: its pose lies between one before and one after it
-constexpr double kFirstTimeout = 60;      // [s]; kernels may have to be compiled
-constexpr double kTimeout = 20;           // [s]
-constexpr double kHeadStart = 0.5;        // [s]; for what travels beside the first frame
-constexpr double kRetryAfter = 0.2;       // [s]
+const ros::Duration kTransformsAhead(1);  // sent ahead of a frame, whose pose is interpolated between one before and one after it
+constexpr double kFirstTimeout = 60;      // [s] for the first frame: kernels may have to be compiled
+constexpr double kTimeout = 20;           // [s] for each other frame
+constexpr double kHeadStart = 0.5;        // [s] for the messages that the first frame needs
+constexpr double kRetryAfter = 0.2;       // [s] for messages that a dropped frame needs
 
-/// ROS' handler of Ctrl-C would end the connections before the last frame is scored.
+/// Without ROS' own handler of Ctrl-C, which would close the connections before the last frame is scored.
 void init_ros(const std::vector<std::string>& arguments) {
   std::vector<std::string> all = {"replay_score"};
   all.insert(all.end(), arguments.begin(), arguments.end());
@@ -31,7 +31,7 @@ void init_ros(const std::vector<std::string>& arguments) {
   try {
     ros::init(count, pointers.data(), "replay_score", ros::init_options::NoSigintHandler | ros::init_options::AnonymousName);
   } catch (const ros::Exception& fault) {
-    throw Error("ROS cannot be used (" + std::string(fault.what()) + "): check the arguments with ':=' and the environment.");
+    throw Error("ROS cannot be started (" + std::string(fault.what()) + "): check the arguments with ':=' and the environment.");
   }
 }
 
@@ -79,7 +79,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
 BagLiveReplay::BagLiveReplay(const Recording& recording, const LiveOptions& options, const std::function<bool()>& stop)
     : recording_(recording) {
   if (std::filesystem::is_directory(recording.path)) {
-    throw Error("'" + recording.path + "' is a folder, and --live plays bags: make one with sequence_to_bag.");
+    throw Error("'" + recording.path + "' is a folder, but --live plays bags: make a bag of it with sequence_to_bag.");
   }
   if (!std::filesystem::exists(recording.path)) throw Error("There is no bag '" + recording.path + "'.");
   init_ros(options.ros_arguments);
@@ -89,7 +89,7 @@ BagLiveReplay::BagLiveReplay(const Recording& recording, const LiveOptions& opti
   tell_what_is_not_heard();
 }
 
-/// Poses must be those that the mapper uses.
+/// Opens the bag with the world frame of the mapper, so that both use the same poses.
 void BagLiveReplay::open_bag() {
   std::string& world = recording_.options.world_frame;
   if (!world.empty() && strip_slash(world) != mapper_->world_frame()) {
@@ -106,7 +106,7 @@ void BagLiveReplay::tell_what_is_not_heard() {
   mapper_->wait_until([this] { return player_->clock_is_heard() && player_->color_is_heard(); }, 2);
   const std::string mapper = "The mapper " + mapper_->name();
   if (!player_->clock_is_heard()) {
-    std::cerr << mapper + " does not follow the recording's clock: set the parameter /use_sim_time to true before it is started.\n";
+    std::cerr << mapper + " does not follow the recording's clock: set the parameter /use_sim_time to true before you start it.\n";
   }
   if (!player_->color_is_heard()) {
     std::cerr << mapper + " does not listen to " + player_->color_topic() + ", the bag's colour images: the map gets no colour.\n";
@@ -120,7 +120,7 @@ std::unique_ptr<BagLiveReplay::Played> BagLiveReplay::next() {
   return std::make_unique<Played>(Played{std::move(*frame), source_->message(), stamp});
 }
 
-/// The clock goes first: where it goes back, tf's listeners forget what they have heard before.
+/// Sends the clock first: if it jumps back, tf listeners clear their buffers, and transforms sent before would be lost.
 void BagLiveReplay::begin(const Played& first) {
   player_->begin(first.stamp);
   mapper_->wait(kHeadStart);
@@ -136,7 +136,7 @@ void BagLiveReplay::send(const Played& played, const ros::Duration& transforms_a
   player_->send_depth(played.message, played.stamp);
 }
 
-/// What travels beside the image may come too late once; then it is there.
+/// The report on a frame. Sends the frame once more if its pose or camera_info came too late: the second time they are there.
 FrameReport BagLiveReplay::answer_to(const Played& played, double timeout) {
   const FrameReport report = mapper_->report_on(played.stamp, timeout);
   if (report.result != FrameReport::DROPPED_NO_POSE && report.result != FrameReport::DROPPED_NO_CAMERA) return report;
@@ -154,7 +154,7 @@ Run BagLiveReplay::map(Yardsticks* yardsticks, const std::function<bool()>& stop
   if (played) begin(*played);
   for (double timeout = kFirstTimeout; played && !run.stopped; timeout = kTimeout) {
     send(*played, kTransformsAhead);
-    std::unique_ptr<Played> following = next();  // while the mapper is busy
+    std::unique_ptr<Played> following = next();  // is read while the mapper is busy
     if (following) player_->send_camera_and_color(following->stamp);
     report = answer_to(*played, timeout);
     add(run, played->frame, report, yardsticks);

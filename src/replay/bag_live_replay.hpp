@@ -1,4 +1,4 @@
-/// LiveReplay of bags.
+/// A LiveReplay that plays bags.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ class BagLiveReplay : public LiveReplay {
   Run map(Yardsticks* yardsticks, const std::function<bool()>& stop) override;
 
  private:
-  /// A frame with the message it was made of.
+  /// A frame and the depth message that it was made of.
   struct Played {
     RecordedFrame frame;
     rosbag::MessageInstance message;

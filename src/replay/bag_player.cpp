@@ -9,7 +9,7 @@ namespace frontier_surfels::replay {
 
 namespace {
 
-constexpr std::uint32_t kNoLimit = 0;  // of a queue: the mapper's reports say when to go on
+constexpr std::uint32_t kNoLimit = 0;  // of a publisher's queue: the mapper's reports say when to send more
 
 template <typename Message>
 ros::AdvertiseOptions of_type(const std::string& topic, bool latch = false) {
@@ -19,7 +19,7 @@ ros::AdvertiseOptions of_type(const std::string& topic, bool latch = false) {
   return options;
 }
 
-/// As the topic was recorded.
+/// Options with the message type with which the topic was recorded.
 ros::AdvertiseOptions as_recorded(const rosbag::Bag& bag, const std::string& topic) {
   rosbag::View view(bag, [&topic](const rosbag::ConnectionInfo* connection) { return connection->topic == topic; });
   const rosbag::ConnectionInfo& connection = *view.getConnections().at(0);
@@ -58,12 +58,12 @@ BagPlayer::BagPlayer(const BagSource& source, RunningMapper& mapper)
       colors_(source.bag(), topics_.color) {
   if (!topics_.color.empty()) color_.emplace(mapper.handle(), as_recorded(source.bag(), topics_.color));
   require_listener(depth_,
-                   "remap its depth/image when it is started (mapper.launch: depth_image; compressed images: image_transport too), or "
+                   "remap its depth/image when you start it (mapper.launch: depth_image, and image_transport for compressed images), or "
                    "choose another topic of the bag with --depth-topic");
   require_listener(info_,
-                   "remap its depth/camera_info when it is started (mapper.launch: depth_info), or choose another topic of the bag with "
+                   "remap its depth/camera_info when you start it (mapper.launch: depth_info), or choose another topic of the bag with "
                    "--info-topic");
-  require_listener(tf_, "it must not be remapped");
+  require_listener(tf_, "do not remap it");
 }
 
 void BagPlayer::require_listener(const PlayedTopic& topic, const std::string& what_to_do) {
@@ -92,7 +92,7 @@ void BagPlayer::send_depth(const rosbag::MessageInstance& message, const ros::Ti
   depth_.publish(message);
 }
 
-/// It never goes back: stamps of some recordings do.
+/// Never sets the clock back, although the stamps of some recordings go back.
 void BagPlayer::set_clock(const ros::Time& stamp) {
   clock_time_ = std::max(clock_time_, stamp);
   rosgraph_msgs::Clock clock;

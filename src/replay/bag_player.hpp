@@ -1,4 +1,4 @@
-/// Publishes a bag's messages for a mapper that takes its time for every frame.
+/// Publishes the messages of a bag at the pace of a mapper.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -16,7 +16,7 @@
 
 namespace frontier_surfels::replay {
 
-/// A topic that is published here, and the nodes that listen to it.
+/// A topic that this program publishes, with a list of the nodes that subscribe to it.
 class PlayedTopic {
  public:
   PlayedTopic(ros::NodeHandle& nh, ros::AdvertiseOptions options);
@@ -29,7 +29,7 @@ class PlayedTopic {
     publisher_.publish(message);
   }
 
-  /// Of another type than the first one of its topic: left out.
+  /// Publishes a recorded message. Does nothing if it has another type than the first message of its topic.
   void publish(const rosbag::MessageInstance& message) const;
 
  private:
@@ -38,24 +38,25 @@ class PlayedTopic {
   ros::Publisher publisher_;
 };
 
-/// Publishes what belongs to a frame, and little more than that: a mapper's queues are short.
+/// Publishes what one frame needs and little more, because a mapper's queues are short.
 class BagPlayer {
  public:
   /// Advertises the bag's topics and waits until the mapper listens. @throws Error if it does not
   BagPlayer(const BagSource& source, RunningMapper& mapper);
 
-  /// Sets the clock for a recording that begins now.
+  /// Sets the clock to the time at which a recording begins.
   void begin(const ros::Time& stamp) { set_clock(stamp); }
 
   void send_static_transforms();
 
-  /// All transforms up to this time of the bag.
+  /// Sends all transforms up to this time of the bag.
   void send_transforms(const ros::Time& until);
 
-  /// The camera of a frame, and the colour images that may be its own. To be called a frame ahead: they travel beside the depth image.
+  /// Sends the camera_info of a frame, and the colour images that may belong to it. Call this before the frame itself is sent, so that
+  /// they arrive first.
   void send_camera_and_color(const ros::Time& stamp);
 
-  /// The clock, then the depth image.
+  /// Sends the clock, then the depth image.
   void send_depth(const rosbag::MessageInstance& message, const ros::Time& stamp);
 
   bool clock_is_heard() const { return clock_.reaches(mapper_.process()); }
@@ -68,7 +69,7 @@ class BagPlayer {
 
   RunningMapper& mapper_;
   const BagTopics topics_;
-  ros::NodeHandle root_;  ///< tf and the clock are everybody's
+  ros::NodeHandle root_;  ///< for tf and the clock, which are global topics
   PlayedTopic clock_, tf_, tf_static_, depth_, info_;
   std::optional<PlayedTopic> color_;
   TransformStream transforms_, static_transforms_;

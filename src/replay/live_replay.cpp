@@ -11,7 +11,7 @@ std::unique_ptr<LiveReplay> open_live_replay(const Recording& recording, const L
   return std::make_unique<BagLiveReplay>(recording, options, stop);
 #else
   (void)recording, (void)options, (void)stop;
-  throw Error("--live needs ROS, and this was built without: leave it out to replay offline, or build with ROS.");
+  throw Error("--live needs ROS, but this program was built without ROS: leave out --live to replay offline, or build with ROS.");
 #endif
 }
 

@@ -1,4 +1,4 @@
-/// A recording mapped by a mapper node that runs already, through its topics.
+/// Replays a recording through the topics of a running mapper node.
 #pragma once
 
 #include <functional>
@@ -19,16 +19,16 @@ class LiveReplay {
  public:
   virtual ~LiveReplay() = default;
 
-  /// That of the running mapper.
+  /// The configuration of the running mapper.
   virtual const Config& config() const = 0;
 
-  /// Like map_recording(), but frames go to the running mapper, and the map comes from there. Once only.
+  /// Like map_recording(), but sends the frames to the running mapper and takes the map from it. Can be called once only.
   virtual Run map(Yardsticks* yardsticks, const std::function<bool()>& stop) = 0;
 };
 
 /// Connects to the running mapper.
-/// @param stop    asked while waiting for it: whether to give up
-/// @throws Error  a sentence that says what is missing; also where this was built without ROS
+/// @param stop    asked while waiting for the mapper: whether to give up
+/// @throws Error  says what is missing; also thrown by a build without ROS
 std::unique_ptr<LiveReplay> open_live_replay(const Recording& recording, const LiveOptions& options, const std::function<bool()>& stop);
 
 }  // namespace frontier_surfels::replay

@@ -1,4 +1,4 @@
-/// A progress bar with rate and time left; silent where standard error is not a terminal.
+/// A progress bar with rate and time left, on standard error. Nothing is shown if that is not a terminal.
 #pragma once
 
 #include <chrono>
@@ -9,14 +9,14 @@ namespace frontier_surfels::replay {
 
 class Progress {
  public:
-  /// @param total  of what update() counts
-  /// @param unit   what is counted, in the plural; empty: only the share is shown
+  /// @param total  the value of update() at the end
+  /// @param unit   name of what is counted, in the plural; empty: only the share is shown
   Progress(std::string title, double total, std::string unit = "");
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Redraws the bar, ten times a second at most.
+  /// Sets how much is done. Redraws the bar at most ten times a second.
   void update(double done);
 
   /// The bar's text, without the terminal's control characters.

@@ -13,10 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPython = "/usr/bin/python3";  // the one that has the distribution's numpy and matplotlib
+constexpr const char* kPython = "/usr/bin/python3";  // has the distribution's numpy and matplotlib, which other Pythons on PATH may lack
 constexpr const char* kScript = "replay_report.py";
 
-/// Beside the executable where it is installed; in the source tree where it was built.
+/// The script: beside the executable if that is installed, else in the source tree.
 fs::path find_script() {
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
   for (const fs::path& candidate : {folder / kScript, folder / FRONTIER_SURFELS_SCRIPTS_FROM_BINARY / kScript}) {
@@ -26,11 +26,11 @@ fs::path find_script() {
               "' nor in the source tree: install the package again.");
 }
 
-/// @return its exit code, or -1
+/// @return the exit code, or -1 if there is none
 int run_python(std::string script, std::string directory) {
   std::string python = kPython;
   std::string no_environment = "-E";  // PYTHONPATH may name another Python's modules
-  std::string no_bytecode = "-B";     // the installed folder may be read-only or shared
+  std::string no_bytecode = "-B";     // the folder of an installed script may be read-only
   char* arguments[] = {python.data(), no_environment.data(), no_bytecode.data(), script.data(), directory.data(), nullptr};
   pid_t pid = 0;
   if (posix_spawn(&pid, kPython, nullptr, nullptr, arguments, environ) != 0) return -1;

@@ -1,11 +1,11 @@
-/// report.html, which the script replay_report.py makes of the other files.
+/// Makes report.html from the other files of a report, with the script replay_report.py.
 #pragma once
 
 #include <string>
 
 namespace frontier_surfels::replay {
 
-/// @throws Error: Python, the script or one of its modules is missing, or it failed; all other files stay as they are
+/// @throws Error  if Python, the script or one of its modules is missing, or the script fails; all other files stay as they are
 void make_report_page(const std::string& directory);
 
 }  // namespace frontier_surfels::replay

@@ -8,7 +8,7 @@
 namespace frontier_surfels::replay {
 namespace {
 
-constexpr std::size_t kSegments = 40000;  // of the exact test's completeness: standard error below 0.25 % of any share
+constexpr std::size_t kSegments = 40000;  // of the exact test: the standard error of any share is below 0.25 %
 
 }  // namespace
 
@@ -76,7 +76,7 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
 }
 
 double peak_rss_mb() {
-  // Not getrusage(): its figure includes what the process was before it became this program, a copy of the one that started it.
+  // getrusage() does not do: its figure includes the memory of the parent process, of which this one was a copy before exec.
   std::ifstream status("/proc/self/status");
   double kib = 0;
   for (std::string word; status >> word;)

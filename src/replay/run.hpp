@@ -15,19 +15,19 @@
 
 namespace frontier_surfels::replay {
 
-/// What is replayed.
+/// A recording, and which part of it is used.
 struct Recording {
   std::string path;
   SourceOptions options;
 };
 
-/// What a map is measured against; filled with the same frames as the map.
+/// What a map is scored against: the exact test and OctoMap. They must get the same frames as the map.
 class Yardsticks {
  public:
   /// @param octomap_resolution  [m]; 0: no OctoMap
   Yardsticks(const Config& config, double octomap_resolution, bool exact);
 
-  /// @return what the frame took OctoMap, where there is one
+  /// @return the time of OctoMap for this frame, if there is an OctoMap
   std::optional<scoring::InsertionTime> add(const DepthFrame& frame);
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
@@ -36,7 +36,7 @@ class Yardsticks {
   /// OctoMap's boundary surfels M; computed once, after the last frame.
   const std::vector<Surfel>& octomap_boundary() const;
 
-  /// Whether a map made with `config` can be measured against these: same depth range, same pixels.
+  /// Whether a map made with `config` can be scored with these yardsticks: they must use the same depth range and the same pixels.
   bool fit(const Config& config) const;
 
  private:
@@ -53,19 +53,19 @@ struct FrameRecord {
   double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
 };
 
-/// What mapping a recording gave.
+/// The result of mapping a recording.
 struct Run {
   Config config;
   std::string device;
   std::vector<FrameRecord> frames;
-  std::vector<std::string> skipped;  ///< why frames were not used: a sentence each
+  std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
-  bool stopped = false;    ///< before the recording's end
+  bool stopped = false;    ///< before the end of the recording
 };
 
-/// Maps what is left of `source` frame by frame. The map itself, its statistics and the peak memory are left to the caller.
+/// Maps the remaining frames of `source`. Does not set the surfels, the statistics and the peak memory of the result.
 /// @param after_frame  called with every frame that the mapper took, and its record
 /// @param stop         asked after every frame whether to leave the rest
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
@@ -74,20 +74,20 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
 /// Maps a recording.
 /// @param yardsticks  if not null: filled with the frames that the mapper took
 /// @param stop        asked after every frame whether to leave the rest
-/// @throws Error      also when not one frame could be used
+/// @throws Error      also if no frame could be used
 Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop);
 
-/// What to say when that was not one.
+/// The error for a recording of which no frame could be used.
 Error nothing_usable(const Recording& recording, const std::vector<std::string>& skipped);
 
-/// [10^6 byte] of this process, so far.
+/// Largest resident memory of this process so far [10^6 byte].
 double peak_rss_mb();
 
-/// Scores of a map; empty where there is no such yardstick.
+/// Scores of a map; those without a yardstick are empty.
 struct Scores {
   std::optional<scoring::OctomapScore> octomap;
   std::optional<scoring::ExactScore> exact;
-  std::vector<scoring::Verdict> verdicts;  ///< of the exact test: one per surfel
+  std::vector<scoring::Verdict> verdicts;  ///< of the exact test, one for each surfel
 };
 
 Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads);

@@ -35,7 +35,7 @@ std::vector<double> column(const std::vector<FrameRecord>& frames, Getter get) {
   return values;
 }
 
-/// 0 for a stage that did not run in this frame.
+/// Time of a stage; 0 if it did not run in this frame.
 double stage_ms(const FrameRecord& frame, const std::string& name) {
   double ms = 0;
   for (const StageTime& stage : frame.report.stages) {
@@ -77,7 +77,7 @@ std::vector<FrameRecord> warm_frames(const std::vector<FrameRecord>& frames) {
 std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames) {
   std::vector<std::string> names;
   for (const FrameRecord& frame : frames) {
-    auto next = names.begin();  // where a stage not seen so far belongs: behind the one before it in this frame
+    auto next = names.begin();  // place for a new stage: behind the one that runs before it in this frame
     for (const StageTime& stage : frame.report.stages) {
       const auto found = std::find(names.begin(), names.end(), stage.name);
       next = (found != names.end() ? found : names.insert(next, stage.name)) + 1;
@@ -193,7 +193,7 @@ void write_file(const std::string& path, const std::string& content) {
   std::ofstream file(path, std::ios::binary);
   file << content;
   file.close();
-  if (!file) throw FileError("'" + path + "' could not be written: check that the folder is writable and the disk not full.");
+  if (!file) throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
 }
 
 }  // namespace frontier_surfels::replay

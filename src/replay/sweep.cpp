@@ -14,11 +14,11 @@ using nlohmann::ordered_json;
 
 constexpr int kMostValues = 1000;
 
-/// Whether fields of this type are numbers; true and false are not.
+/// Whether fields of this type are numbers. A bool is not one.
 template <typename Field>
 constexpr bool kIsNumber = std::is_arithmetic_v<Field> && !std::is_same_v<Field, bool>;
 
-/// @return false: there is no numeric field of that name
+/// @return whether there is a numeric field of that name
 bool set_number(Config& config, const std::string& name, double value) {
   bool found = false;
   for_each_field(config, [&](const FieldInfo& info, auto& field) {
@@ -43,7 +43,7 @@ std::string unit_of(const std::string& name) {
   return unit;
 }
 
-/// @throws std::exception where the text is not a number
+/// @throws std::exception if the text is not a number
 double parse_number(const std::string& text) {
   std::size_t end = 0;
   const double value = std::stod(text, &end);
@@ -111,7 +111,7 @@ ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yar
     std::optional<Yardsticks> own;
     if (!yardsticks.fit(config)) own.emplace(config, octomap_resolution, yardsticks.exact().has_value());
     const Run run = map_recording(recording, config, own ? &*own : nullptr, stop);
-    if (run.stopped) break;  // scores of half a map cannot be compared with the others
+    if (run.stopped) break;  // the scores of a part of the recording cannot be compared with the others
     values.push_back(point_json(value, run, score(run.surfels, own ? *own : yardsticks, config.threads)));
   }
   return {{"parameter", sweep.parameter}, {"unit", unit_of(sweep.parameter)}, {"values", values}};

@@ -25,7 +25,7 @@ bool is_finite(const Surfel& surfel) { return surfel.position.allFinite() && sur
 
 /// How far from its centre a surfel is probed [m].
 double reach(const Surfel& surfel) {
-  const double farthest = std::max(kProbesPerSide * kProbeStep, 1.75 * std::abs(static_cast<double>(surfel.radius)));
+  const double farthest = std::max(kProbesPerSide * kProbeStep, kFrontProbe * std::abs(static_cast<double>(surfel.radius)));
   return farthest * surfel.normal.cast<double>().norm();
 }
 
@@ -61,7 +61,7 @@ class LocalViews {
 Verdict judge(const Surfel& surfel, LocalViews& views) {
   const Eigen::Vector3d p = surfel.position.cast<double>(), n = surfel.normal.cast<double>();
   const double r = surfel.radius;
-  const bool back = views.known(p - r / 4 * n), front = views.known(p + 7 * r / 4 * n);
+  const bool back = views.known(p - kBackProbe * r * n), front = views.known(p + kFrontProbe * r * n);
   if (front) return back ? Verdict::kBuried : Verdict::kRight;
   return back ? Verdict::kFlipped : Verdict::kFloating;
 }

@@ -9,7 +9,8 @@ void Candidates::find(const Frame& frame, const BitField& observed, DeviceArray<
   candidates_.allocate(words(g));
   counters.resize(COUNTS);
   const std::size_t rows = VIEW_TILE * tiles(g.size_j);
-  commands_.run("candidates", "find_candidates", chunks(g.size_i) * g.words_k * rows, kGroup, g, observed(), candidates_(), counters());
+  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, g, observed(),
+                candidates_(), counters());
 }
 
 CandidateList::CandidateList(Commands& commands, Lists& lists)
@@ -18,9 +19,10 @@ CandidateList::CandidateList(Commands& commands, Lists& lists)
 void CandidateList::list(const Frame& frame, const Camera& camera, const BitField& observed, const Candidates& candidates) {
   const char* stage = "directions";
   count_ = lists_.list_bits(stage, candidates.bits(), Candidates::words(frame.grid), voxels_);
-  around_.resize(chunks(count_) * LANES);
-  directions_.resize(chunks(count_) * 3 * LANES);
-  commands_.run(stage, "find_directions", chunks(count_), commands_.device().heavy_group(), frame.grid, camera.layer_depth()(), observed(),
+  const std::size_t chunks = commands_.chunks(count_);
+  around_.resize(chunks * commands_.lanes());
+  directions_.resize(chunks * 3 * commands_.lanes());
+  commands_.run(stage, "find_directions", chunks, commands_.device().heavy_group(), frame.grid, camera.layer_depth()(), observed(),
                 voxels_(), static_cast<cl_int>(count_), around_(), directions_());
 }
 

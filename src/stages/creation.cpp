@@ -10,9 +10,10 @@ std::size_t Creation::filter(const Frame& frame, const CandidateList& list, cons
   const std::size_t words = (list.count() + 63) / 64;
   kept_.resize(words + 1);
   const BitField& known_or_any = known != nullptr ? *known : candidates.bits();  // a kernel takes no missing buffer
-  commands_.run(stage, "filter_candidates", 64 / LANES * words, commands_.device().heavy_group(), frame.grid, frame.limits, list.voxels()(),
-                static_cast<cl_int>(list.count()), list.directions()(), candidates.bits()(), static_cast<cl_int>(known != nullptr),
-                known_or_any(), kept_());
+  if (commands_.lanes() == 1) kept_.fill(stage, 0, words);                       // work items share words then
+  commands_.run(stage, "filter_candidates", 64 / commands_.lanes() * words, commands_.device().heavy_group(), frame.grid, frame.limits,
+                list.voxels()(), static_cast<cl_int>(list.count()), list.directions()(), candidates.bits()(),
+                static_cast<cl_int>(known != nullptr), known_or_any(), kept_());
   count_ = lists_.list_bits(stage, kept_, words, chosen_);
   new_.resize(count_);
   return count_;
@@ -21,7 +22,7 @@ std::size_t Creation::filter(const Frame& frame, const CandidateList& list, cons
 void Creation::create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views,
                       const CandidateList& list, SurfelMap& map) {
   const char* stage = "creation";
-  commands_.run(stage, "create_surfels", chunks(count_), commands_.device().heavy_group(), frame.grid, frame.limits, frame.window,
+  commands_.run(stage, "create_surfels", commands_.chunks(count_), commands_.device().heavy_group(), frame.grid, frame.limits, frame.window,
                 frame.T_local_camera, static_cast<cl_int>(refine_), frame.own_view, views.views(), tile_views(),
                 static_cast<cl_int>(views.view_groups()), views.depths(), camera.layer_depth()(), chosen_(), static_cast<cl_int>(count_),
                 list.voxels()(), list.around()(), list.directions()(), new_.surfels(), new_.cells());

@@ -27,7 +27,6 @@ using BitField = DeviceArray<cl_ulong>;
 /// @name Sizes of launches and of buffers
 /// @{
 constexpr std::size_t kGroup = 64;  ///< work items of a group, where a kernel does not ask for another number
-inline std::size_t chunks(std::size_t count) { return (count + LANES - 1) / LANES; }                           ///< of LANES elements
 inline std::size_t tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }                              ///< of VIEW_TILE voxels
 inline std::size_t words(const Grid& g) { return static_cast<std::size_t>(g.size_i) * g.size_j * g.words_k; }  ///< of a bit field
 inline std::size_t tile_columns(const Grid& g) { return tiles(g.size_i) * tiles(g.size_j) * g.words_k; }       ///< tiles one word deep

@@ -19,8 +19,9 @@ void KnownHull::compute(const Frame& frame, const NeededPaths& needed, const Sur
   states_.allocate(size(frame.grid));
   faces_.fill(stage, 0xffffffffU, cells);
   const std::size_t pages = map.list_pages_near(kReach * frame.grid.z_max, near_pages_);
-  commands_.run(stage, "project_hull", PAGE_ITEMS * pages, kGroup, frame.grid, frame.limits, frame.window, frame.T_camera_local,
-                near_pages_(), static_cast<cl_uint>(pages), map.alive(), map.page_block(), map.surfels(), needed.lines()(), faces_());
+  commands_.run(stage, "project_hull", PAGE_SLOTS / commands_.lanes() * pages, kGroup, frame.grid, frame.limits, frame.window,
+                frame.T_camera_local, near_pages_(), static_cast<cl_uint>(pages), map.alive(), map.page_block(), map.surfels(),
+                needed.lines()(), faces_());
   const std::size_t most = std::max({j * w, i * w, i * j});
   commands_.run(stage, "hull_states", cl::NDRange((most + kGroup - 1) / kGroup * kGroup, 6), cl::NDRange(kGroup, 1), frame.grid, faces_(),
                 states_());

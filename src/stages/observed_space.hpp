@@ -12,7 +12,7 @@ class ObservedSpace {
   /// @param camera  with the frame's image
   void compute(const Frame& frame, const Camera& camera);
 
-  const BitField& bits() const { return observed_; }  ///< C~, a bit for each voxel; LANES words more can be read
+  const BitField& bits() const { return observed_; }  ///< C~, a bit for each voxel; SPARE_WORDS more words can be read
 
   /// [height][width] of the working image: the pyramid's layers below this one are observed; 0 where the pixel is no measurement.
   const DeviceArray<cl_int>& column_end() const { return column_end_; }
@@ -20,7 +20,7 @@ class ObservedSpace {
  private:
   Commands& commands_;
   DeviceArray<cl_int> column_end_;
-  DeviceArray<cl_ushort> valid_;  ///< a bit for each pixel
+  DeviceArray<cl_uint> valid_;  ///< a bit for each pixel
   BitField observed_;
 };
 

@@ -10,9 +10,9 @@ void remove_surfels(Commands& commands, const BitField& removed, std::size_t cou
 
 void label_surfels(Commands& commands, const Frame& frame, const Camera& camera, const DeviceArray<cl_int>& column_end, SurfelMap& map) {
   const std::size_t pages = map.window_pages();
-  commands.run("labels", "label_surfels", PAGE_ITEMS * pages, PAGE_GROUP, frame.grid, frame.limits, frame.window, frame.T_camera_local,
-               camera.depth()(), column_end(), camera.color()(), frame.has_color, map.pages(), static_cast<cl_uint>(pages), map.alive(),
-               map.changed(), map.page_block(), map.surfels());
+  commands.run("labels", "label_surfels", PAGE_SLOTS / commands.lanes() * pages, PAGE_GROUP, frame.grid, frame.limits, frame.window,
+               frame.T_camera_local, camera.depth()(), column_end(), camera.color()(), frame.has_color, map.pages(),
+               static_cast<cl_uint>(pages), map.alive(), map.changed(), map.page_block(), map.surfels());
 }
 
 }  // namespace frontier_surfels

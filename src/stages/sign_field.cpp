@@ -21,8 +21,8 @@ void ViewSurfels::place(const Frame& frame, const BitField& in_view, const Surfe
   count_ = count;
   surfels_.resize(std::max<std::size_t>(count_, 1));  // the sign field is computed without surfels, too
   commands_.run(kStage, "to_slots", count_, kGroup, map.pages(), slots_(), count);
-  commands_.run(kStage, "place_surfels", count_, kGroup, frame.grid, frame.window, frame.T_camera_local, map.page_block(), map.surfels(),
-                slots_(), count, surfels_());
+  commands_.run(kStage, "place_surfels", commands_.chunks(count_), kGroup, frame.grid, frame.window, frame.T_camera_local, map.page_block(),
+                map.surfels(), slots_(), count, surfels_());
 }
 
 SignField::SignField(Commands& commands, Lists& lists)

@@ -10,13 +10,14 @@ std::size_t SurfelSplit::split(const Frame& frame, const BitField& large, Surfel
   const std::uint32_t parents = lists_.list_bits(stage, large, map.window_pages(), parents_);
   commands_.run(stage, "to_slots", parents, kGroup, map.pages(), parents_(), parents);
   offsets_.resize(parents + 1);
-  commands_.run(stage, "count_children", parents, kGroup, frame.grid, frame.limits, frame.window, frame.T_camera_local, map.page_block(),
-                map.surfels(), parents_(), parents, offsets_());
+  commands_.run(stage, "count_children", commands_.chunks(parents), kGroup, frame.grid, frame.limits, frame.window, frame.T_camera_local,
+                map.page_block(), map.surfels(), parents_(), parents, offsets_());
   const std::uint32_t children = lists_.scan(stage, offsets_, parents);
   map.reserve(children);
   children_.resize(children);
-  commands_.run(stage, "split", parents, kGroup, frame.grid, frame.limits, frame.window, frame.T_camera_local, map.page_block(),
-                map.surfels(), parents_(), parents, offsets_(), children_.surfels(), children_.cells(), map.alive(), map.changed());
+  commands_.run(stage, "split", commands_.chunks(parents), kGroup, frame.grid, frame.limits, frame.window, frame.T_camera_local,
+                map.page_block(), map.surfels(), parents_(), parents, offsets_(), children_.surfels(), children_.cells(), map.alive(),
+                map.changed());
   map.removed(parents);
   map.insert(stage, children_.surfels, children_.cells, children);
   return children - parents;

@@ -15,10 +15,10 @@ SurfelVisit::Found SurfelVisit::visit(const Frame& frame, const Camera& camera, 
                                       Candidates& candidates) {
   const std::size_t pages = map.window_pages();
   for (BitField* bits : {&in_view_, &large_, &removed_}) bits->resize(pages + 1);
-  commands_.run("in_view", "visit_surfels", PAGE_ITEMS * pages, PAGE_GROUP, frame.grid, frame.limits, frame.window, frame.T_camera_local,
-                frame.own_view, static_cast<cl_int>(remove_buried_), frame.has_color, views.depths(), camera.depth()(), column_end(),
-                map.pages(), static_cast<cl_uint>(pages), map.alive(), map.page_block(), map.surfels(), observed(), candidates.bits()(),
-                map.changed(), in_view_(), large_(), removed_(), counts_());
+  commands_.run("in_view", "visit_surfels", PAGE_SLOTS / commands_.lanes() * pages, PAGE_GROUP, frame.grid, frame.limits, frame.window,
+                frame.T_camera_local, frame.own_view, static_cast<cl_int>(remove_buried_), frame.has_color, views.depths(),
+                camera.depth()(), column_end(), map.pages(), static_cast<cl_uint>(pages), map.alive(), map.page_block(), map.surfels(),
+                observed(), candidates.bits()(), map.changed(), in_view_(), large_(), removed_(), counts_());
   const std::vector<cl_uint> counts = counts_.read(COUNTS);
   return {counts[COUNT_IN_VIEW], counts[COUNT_LARGE], counts[COUNT_REMOVED]};
 }

@@ -13,7 +13,7 @@ class ViewSettling {
   /// Takes those candidates off whose centre a kept view has seen.
   void settle(const Frame& frame, const Camera& camera, RecentViews& views, Candidates& candidates);
 
-  /// [tiles of the grid][groups of LANES views]: of tiles with candidates left, a bit for each view that may know something near them.
+  /// [tiles of the grid][groups of VIEW_GROUP views]: of tiles with candidates left, a bit for each view that may know something near them.
   const DeviceArray<cl_ushort>& tile_views() const { return tile_views_; }
 
  private:

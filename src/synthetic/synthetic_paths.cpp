@@ -1,4 +1,4 @@
-/// Ways of the camera through the synthetic room.
+/// The paths of the camera through the synthetic room.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Where the hand is and where it looks: yaw from x to y, pitch downwards, roll [rad].
+/// Position and direction of the camera: yaw from x towards y, pitch downwards, roll [rad].
 struct Aim {
   Vector3d p_world;
   double yaw = 0, pitch = 0, roll = 0;
@@ -26,9 +26,18 @@ Aim orbit(double angle) {
   return aim;
 }
 
+/// Six turns, down to the floor and up to the ceiling twice, on one way around the table.
+Aim explore(double angle) {
+  Aim aim;
+  aim.p_world = {1.2 * std::cos(angle), 1.5 * std::sin(angle), 1.4};
+  aim.yaw = M_PI + 6 * angle;
+  aim.pitch = 0.25 + 0.7 * std::sin(2 * angle);
+  return aim;
+}
+
 Aim turn(double angle) { return {{1.0, 1.2, 1.4}, angle, 0.25 + 0.2 * std::sin(2 * angle), 0}; }
 
-/// A station of a path: straight and evenly from each to the next.
+/// A point of a path. The camera moves on a straight line from each to the next.
 struct Station {
   double x, y, z, yaw, pitch;
 };
@@ -68,6 +77,8 @@ Aim close_up(double share) {
 Aim aim_of(CameraPath path, int index, int frames) {
   const double share = static_cast<double>(index) / std::max(1, frames), angle = 2 * M_PI * share;
   switch (path) {
+    case CameraPath::kExplore:
+      return explore(angle);
     case CameraPath::kTurn:
       return turn(angle);
     case CameraPath::kWalk:
@@ -84,7 +95,7 @@ Aim aim_of(CameraPath path, int index, int frames) {
 Eigen::Isometry3d camera_pose(CameraPath path, int index, int frames) {
   const auto tremble = [&](double rate) { return std::sin(rate * index) + std::sin(1.7 * rate * index + 1); };
   const Aim aim = aim_of(path, index, frames);
-  // A hand that only turns trembles in its angles alone.
+  // The path that only turns trembles in its angles alone.
   const double shift = path == CameraPath::kTurn ? 0 : 0.006;
   const Vector3d p_world = aim.p_world + shift * Vector3d(tremble(0.9), tremble(1.1), tremble(1.3));
   const Eigen::Quaterniond forward_to_optical(-0.5, 0.5, -0.5, 0.5);  // x forward, z up -> z forward, y down

@@ -32,7 +32,7 @@ using Solids = std::vector<Solid>;
 
 void append(Solids& solids, const Solids& more) { solids.insert(solids.end(), more.begin(), more.end()); }
 
-/// Four posts below a plate [low, high].
+/// Four posts below the plate from `low` to `high`.
 Solids legs(const Vector3d& low, const Vector3d& high, double thickness, const Rgb& rgb) {
   Solids posts;
   for (const double x : {low.x(), high.x() - thickness}) {
@@ -91,8 +91,8 @@ Solids along_the_walls() {
           cylinder({-1.6, 2.1, 0}, 0.16, 0.4, {90, 90, 100})};  // a bin
 }
 
-/// A box is the slabs of its three axes: how far along the ray each is entered and left. Rays parallel to a slab are never or always in it
-/// (-Inf, Inf).
+/// Intersects the intervals of the ray that lie between opposite faces of the box. The interval of a ray that is parallel to two faces is
+/// empty or (-Inf, Inf).
 double cast_box(const Solid& solid, const Vector3d& origin, const Vector3d& inverse_direction) {
   double enter = -kNever, leave = kNever;
   for (int axis = 0; axis < 3; ++axis) {
@@ -105,7 +105,7 @@ double cast_box(const Solid& solid, const Vector3d& origin, const Vector3d& inve
   return enter > 0 && enter < leave ? enter : kNever;
 }
 
-/// First root of a t^2 - 2 b t + c = 0.
+/// The smaller root of a t^2 - 2 b t + c = 0, or kNever.
 double first_root(double a, double b, double c) {
   const double discriminant = b * b - a * c;
   return discriminant > 0 && a > 0 ? (b - std::sqrt(discriminant)) / a : kNever;
@@ -148,7 +148,7 @@ double distance_to(const Solid& solid, const Vector3d& p) {
   return beyond.cwiseMax(0).norm() + std::min(beyond.maxCoeff(), 0.0);
 }
 
-/// Normal of the surface that `p` lies on.
+/// Normal of the surface at a point `p` of it.
 Vector3d normal_at(const Solid& solid, const Vector3d& p) {
   const Vector3d offset = p - solid.centre;
   if (solid.shape == Solid::Shape::kSphere) return offset.normalized();
@@ -165,7 +165,7 @@ Rgb shaded(const Solid& solid, const Vector3d& p, const Vector3d& normal) {
   static const Vector3d kLight = Vector3d(0.3, 0.5, 0.8).normalized();
   double brightness = 0.8 + 0.2 * normal.dot(kLight);
   if (solid.tile > 0) {
-    // A hair's breadth inside, so that the pattern does not flicker on a surface that is a tile's border.
+    // The point is moved a little inwards, because the pattern would flicker on surfaces that are borders of tiles.
     const Vector3d cell = ((p - 1e-6 * normal) / solid.tile).array().floor();
     if (std::fmod(std::abs(cell.sum()), 2) == 1) brightness *= 0.7;
   }

@@ -9,12 +9,12 @@ namespace {
 constexpr double kDisparityStep = 2.85e-3;     // [1/m]; Khoshelham and Elberink, Sensors 2012: depth resolution 2.85e-3 z^2
 constexpr double kDisparityDeviation = 0.5;    // [step]
 constexpr double kGrazingCosine = 0.17;        // 80 degrees
-constexpr double kJump = 0.04;                 // relative step of depth between neighbours that is an edge
+constexpr double kJump = 0.04;                 // smallest relative step of depth between neighbours that counts as an edge
 constexpr double kLostAtEdges = 0.7;           // share of pixels
 constexpr double kSmallestBlob = 2.0 / 640.0;  // radius over image width
 constexpr double kLargestBlob = 16.0 / 640.0;
 
-/// cv::RNG's own sequence is the same everywhere, but similar seeds start it alike: stir the seed (splitmix64).
+/// Mixes a seed and a frame index (splitmix64). Similar seeds would give similar first numbers of cv::RNG.
 std::uint64_t stirred(std::uint64_t seed, int index) {
   std::uint64_t z = seed * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(index) + 1;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -49,7 +49,7 @@ void drop_edges(cv::Mat& depth, const cv::Mat& cos_incidence, cv::RNG& random) {
   }
 }
 
-/// Discs of random size until the share of the image is covered.
+/// Drops discs of random size until `share` of the image is covered.
 void drop_blobs(cv::Mat& depth, double share, cv::RNG& random) {
   cv::Mat lost = cv::Mat::zeros(depth.size(), CV_8UC1);
   const double wanted = std::min(share, 1.0) * static_cast<double>(depth.total());

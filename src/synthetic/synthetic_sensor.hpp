@@ -1,4 +1,4 @@
-/// From exact depth to what a sensor would have measured.
+/// Turns exact depth into what a sensor would measure.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -7,10 +7,10 @@
 
 namespace frontier_surfels::replay {
 
-/// @param depth          CV_32FC1 [m]; 0: nothing
-/// @param cos_incidence  CV_32FC1, between ray and surface normal
-/// @param index          of the frame: each has its own random numbers
-/// @return               CV_16UC1 [mm]
+/// @param depth          CV_32FC1 [m]; 0: no surface
+/// @param cos_incidence  CV_32FC1, cosine of the angle between ray and surface normal
+/// @param index          index of the frame: each has its own random numbers
+/// @return               CV_16UC1 [mm]; 0: no measurement
 cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index);
 
 }  // namespace frontier_surfels::replay

@@ -1,4 +1,4 @@
-// Maps one frame of a wall, saves the map and loads it; exit code 0 if that gave a map.
+// Maps one frame of a wall, saves the map and reads it again. Exit code 0 if that worked.
 #include <frontier_surfels/mapper.hpp>
 #include <frontier_surfels/ply.hpp>
 #include <frontier_surfels/scoring/exact_test.hpp>

@@ -1,4 +1,4 @@
-/// Bags, messages and comparisons for the tests of bags.
+/// Makes bags and messages, and compares images, for the tests of bags.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ inline bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
          std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
-/// A folder for bags that is gone after the test.
+/// A folder for bags that is removed after the test.
 class BagTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -58,7 +58,7 @@ class BagTest : public testing::Test {
   std::string path_;
 };
 
-/// Of every image made here, in pixels.
+/// Size of every image made here [pixel].
 inline constexpr int kWidth = 4, kHeight = 3;
 
 inline sensor_msgs::Image depth_message(double stamp, std::uint16_t value = 1500) {
@@ -105,7 +105,7 @@ inline tf2_msgs::TFMessage tf_message(double stamp, const std::string& parent, c
   return message;
 }
 
-/// Writes messages at whatever time.
+/// Writes messages, at any time.
 class Handmade {
  public:
   explicit Handmade(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
@@ -116,7 +116,7 @@ class Handmade {
     return *this;
   }
 
-  /// As tf's first version wrote it: the same message of another name.
+  /// A message of the first version of tf, which is the same except for the name of its type.
   Handmade& add_of_old_type(const std::string& topic, double time, const tf2_msgs::TFMessage& message) {
     namespace traits = ros::message_traits;
     const ros::M_string header = {
@@ -125,7 +125,7 @@ class Handmade {
     return *this;
   }
 
-  /// What every test needs and none is about: a camera that moves 1 m in 1 s from time 10 on.
+  /// Transforms of a camera that moves 1 m in 1 s from time 10 on, which all tests need.
   Handmade& add_camera_and_motion() {
     add("/depth/camera_info", 10, info_message(10));
     add("/tf", 10, tf_message(10, "world", "camera", 0));

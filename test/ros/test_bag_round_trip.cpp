@@ -1,4 +1,4 @@
-/// What sequence_to_bag writes comes back.
+/// Frames that sequence_to_bag has written are read back as they were.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace frontier_surfels::replay {
 namespace {
 
-/// Frames of the room, held in memory.
+/// Frames of the synthetic room, kept in memory.
 class RoomSource : public FrameSource {
  public:
   explicit RoomSource(std::vector<RecordedFrame> frames) : frames_(std::move(frames)) {}
@@ -79,7 +79,7 @@ TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   }
 }
 
-/// The mapper takes float(mm) / 1000; maps are the same bit for bit only if the bag has those very floats.
+/// The mapper computes float(mm) / 1000. Maps are the same bit for bit only if the bag contains exactly these floats.
 TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
   const std::vector<RecordedFrame> written = room_frames(), read = write_and_read({});
   ASSERT_EQ(read.size(), written.size());

@@ -1,4 +1,4 @@
-/// Bags made by hand: transforms of all kinds, colour, topics, and every fault of a file.
+/// Reading of bags: all kinds of transforms, colour, topics, and every fault of a file.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -202,8 +202,8 @@ TEST_F(BagTest, ListsTheCandidatesWhenTopicsAreAmbiguous) {
 TEST_F(BagTest, SaysWhatIsWrongWithFiles) {
   std::ofstream(path_).close();
   EXPECT_TRUE(says(failure(), "empty"));
-  std::ofstream(path_) << "PK, and other things that no bag begins with";
-  EXPECT_TRUE(says(failure(), "no bag of ROS 1"));
+  std::ofstream(path_) << "PK, with which no bag begins";
+  EXPECT_TRUE(says(failure(), "not a bag of ROS 1"));
   std::ofstream(path_) << "#ROSBAG V1.2\n";
   EXPECT_TRUE(says(failure(), "rosbag fix"));
   Handmade(path_).add("/chatter", 10, depth_message(10).header);

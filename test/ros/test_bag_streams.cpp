@@ -1,4 +1,4 @@
-// Which messages of a bag go to a running mapper with a frame, against the slow obvious way: those that the frame itself is made of.
+// Which messages of a bag are sent to a running mapper for a frame. Compared with the slow obvious way: those that the frame is made of.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -80,9 +80,9 @@ TEST_F(BagStreams, CamerasAreThoseAtOrBeforeTheFrame) {
     for (const double stamp : {10.0, 11.0, 11.5, 12.0, 15.0}) bag_file.add("/info", stamp, info_message(stamp));
   }
   CameraStream stream(bag(), "/info");
-  EXPECT_EQ(take(stream, 9), 10) << "before the first one the first";
-  EXPECT_EQ(take(stream, 9.5), 0) << "it is known";
-  EXPECT_EQ(take(stream, 11.75), 11.5) << "11 would be of no use any more";
+  EXPECT_EQ(take(stream, 9), 10) << "the first one is used before its stamp";
+  EXPECT_EQ(take(stream, 9.5), 0) << "it was returned before";
+  EXPECT_EQ(take(stream, 11.75), 11.5) << "11 is not the last one before the stamp";
   EXPECT_EQ(take(stream, 12), 12);
   EXPECT_EQ(take(stream, 14.9), 0);
   EXPECT_EQ(take(stream, 99), 15);
@@ -96,7 +96,7 @@ TEST_F(BagStreams, ColoursAreThoseAroundTheFrame) {
   }
   ColorStream stream(bag(), "/rgb");
   EXPECT_EQ(take(stream, 10.3), (Stamps{10.25, 10.5}));
-  EXPECT_EQ(take(stream, 10.4), Stamps()) << "both are known";
+  EXPECT_EQ(take(stream, 10.4), Stamps()) << "both were returned before";
   EXPECT_EQ(take(stream, 10.5), Stamps());
   EXPECT_EQ(take(stream, 10.75), (Stamps{10.75})) << "none before it can be nearer";
   EXPECT_EQ(take(stream, 12), (Stamps{11.25}));

@@ -57,7 +57,7 @@ class FrameFixture {
     return reference::unpack(field.read(words(grid()), offset), grid().size_i, grid().size_j, grid().size_k);
   }
   void write(BitField& field, const Bits& bits, std::size_t offset = 0) const {
-    field.grow(offset + words(grid()) + LANES, offset);  // kernels read vectors beyond the end
+    field.grow(offset + words(grid()) + SPARE_WORDS, offset);
     field.write(reference::pack(bits), offset);
   }
 

@@ -16,11 +16,16 @@ inline std::string test_platform() {
   return platform == nullptr ? "" : platform;
 }
 
-inline Device test_device() {
+/// Configuration with the platform to test, and the lanes from FRONTIER_SURFELS_TEST_LANES (16 or 1); without it the device's own number.
+inline Config test_config() {
   Config config;
   config.platform = test_platform();
-  return choose_device(config);
+  const char* lanes = std::getenv("FRONTIER_SURFELS_TEST_LANES");
+  if (lanes != nullptr) set_field(config, "lanes", lanes);
+  return config;
 }
+
+inline Device test_device() { return choose_device(test_config()); }
 
 /// Built once per program, because compiling the kernels takes longer than most tests. Never destroyed, because a driver may be unloaded
 /// earlier.
@@ -33,8 +38,7 @@ inline Commands& test_commands() {
 inline std::unique_ptr<Commands> one_thread_commands() {
   const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
   if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end()) return nullptr;
-  Config one;
-  one.platform = test_platform();
+  Config one = test_config();
   one.threads = 1;
   return std::make_unique<Commands>(choose_device(one));
 }

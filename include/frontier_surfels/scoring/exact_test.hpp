@@ -10,10 +10,10 @@
 
 namespace frontier_surfels::scoring {
 
-/// Shares between 0 and 1; see the README for each.
+/// Shares between 0 and 1; doc/method.md defines each.
 struct ExactScore {
   // Per surfel. right + buried + floating + flipped = 1.
-  double right = 0;                     ///< not known(p - r/4 n) and known(p + 7/4 r n)
+  double right = 0;                     ///< not known(p - kBackProbe r n) and known(p + kFrontProbe r n)
   double buried = 0;                    ///< both known
   double floating = 0;                  ///< neither known
   double flipped = 0;                   ///< only the back one known
