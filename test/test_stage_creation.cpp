@@ -220,6 +220,27 @@ Scene prepare(const CameraSetup& camera, CreationFixture& fixture, double densit
   return scene;
 }
 
+/// Expects a valid new surfel in voxel v. @return distance by which it was moved from the voxel's centre [voxel]
+double check_new_surfel(const Scene& scene, const Vector3i& v, const Surfel& surfel, std::uint32_t attributes) {
+  const bool refine = scene.camera.config.refine_surfels;
+  const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
+  const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
+  const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v).normalized();
+  const Truth ragged = refine ? !has_known_front(scene, v, mean) : Truth::no;
+  if (refine)
+    EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();
+  else
+    EXPECT_LT((normal - mean).norm(), 1e-4) << "normal " << normal.transpose();
+  if (ragged != Truth::open) {
+    EXPECT_EQ(attributes, ragged == Truth::yes ? SURFEL_RAGGED : 0);
+  }
+  const double size = scene.grid.voxel_size(scene.grid.center_of(v.x(), v.y(), v.z()).z());
+  EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, size / 2048) << "more than the rounding to 16 bits";
+  EXPECT_EQ(surfel.label, Label::kFrontier);
+  EXPECT_TRUE((surfel.rgb == std::array<std::uint8_t, 3>{0, 0, 0}));
+  return check_place(scene, v, normal, p);
+}
+
 /// @return number of new surfels that were moved
 std::size_t check_creation(CameraSetup camera, int old_surfels, double density, bool refine = true) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(old_surfels) + " old surfels, density " + std::to_string(density));
@@ -252,23 +273,7 @@ std::size_t check_creation(CameraSetup camera, int old_surfels, double density, 
   for (std::size_t n = 0; n < scene.voxels.size(); ++n) {
     const Vector3i v = scene.voxels[n];
     SCOPED_TRACE(voxel_text(v.x(), v.y(), v.z()));
-    const Surfel& surfel = by_slot.at(slots[n]);
-    const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
-    const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
-    const Vector3d mean = sum_of_directions(grid, scene.observed, v).normalized();
-    const Truth ragged = refine ? !has_known_front(scene, v, mean) : Truth::no;
-    if (refine)
-      EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();
-    else
-      EXPECT_LT((normal - mean).norm(), 1e-4) << "normal " << normal.transpose();
-    if (ragged != Truth::open) {
-      EXPECT_EQ(fixture.access().attributes(slots[n]), ragged == Truth::yes ? SURFEL_RAGGED : 0);
-    }
-    const double size = grid.voxel_size(grid.center_of(v.x(), v.y(), v.z()).z());
-    EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, size / 2048) << "more than the rounding to 16 bits";
-    EXPECT_EQ(surfel.label, Label::kFrontier);
-    EXPECT_TRUE((surfel.rgb == std::array<std::uint8_t, 3>{0, 0, 0}));
-    moved += check_place(scene, v, normal, p) > 1e-3;
+    moved += check_new_surfel(scene, v, by_slot.at(slots[n]), fixture.access().attributes(slots[n])) > 1e-3;
   }
   return moved;
 }
