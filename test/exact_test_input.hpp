@@ -13,7 +13,7 @@ namespace frontier_surfels::scoring {
 using Eigen::Vector3d;
 using Encoding = DepthImage::Encoding;
 
-/// A depth image with its bytes, as a driver would deliver it.
+/// A depth frame that owns its image's bytes, laid out as a driver would deliver them.
 struct OwnedFrame {
   std::vector<unsigned char> bytes;
   DepthFrame frame;

@@ -1,4 +1,4 @@
-/// Folders and contents for the tests of map folders.
+/// Folders and their contents for the tests of map folders.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -39,10 +39,10 @@ std::string fault_of(const Action& action) {
   } catch (const FileError& error) {
     return error.what();
   }
-  return "nothing was refused";
+  return "no FileError was thrown";
 }
 
-/// Whether a fault is a sentence that says this.
+/// Is `said` a sentence about a map folder that contains `what`?
 inline testing::AssertionResult says(const std::string& said, const std::string& what) {
   if (said.find(what) != std::string::npos && said.find("The map folder") == 0 && said.back() == '.') return testing::AssertionSuccess();
   return testing::AssertionFailure() << "said '" << said << "'";

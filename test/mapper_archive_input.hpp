@@ -1,4 +1,4 @@
-/// Walks that are longer than memory, for the tests of mappers with a map folder.
+/// Walks whose maps do not fit into memory, for the tests of mappers with a map folder.
 #pragma once
 
 #include <unistd.h>
@@ -14,7 +14,7 @@
 
 namespace frontier_surfels {
 
-/// Small images and ranges; few recent views, so that the known space must be computed from the surfels, which then matter from afar.
+/// Small images and ranges. Few recent views, so that known space is computed from the surfels, including distant ones.
 inline Config walking() {
   Config config = undecimated();
   config.z_max = 1.5;
@@ -29,7 +29,7 @@ inline Config walking(const std::string& folder) {
   return config;
 }
 
-/// A view of a wall with steps in it. @param metres  how far along the wall
+/// A view of a wall with steps in it. @param metres  position along the wall
 inline replay::RecordedFrame wall_frame(double metres, double height) {
   replay::RecordedFrame frame = plane_frame(plain_camera(40, 30, 36), 0, look_along({0, metres, height}, {1, 0.1 * height, 0}));
   for (int v = 0; v < 30; ++v)
@@ -37,21 +37,21 @@ inline replay::RecordedFrame wall_frame(double metres, double height) {
   return frame;
 }
 
-/// `metres` along the wall, every 25 cm.
+/// A walk of `metres` along the wall, with a frame every 25 cm.
 inline Frames walk_there(double metres) {
   Frames frames;
   for (double y = 0; y <= metres; y += 0.25) frames.push_back(wall_frame(y, 0));
   return frames;
 }
 
-/// There, and back on another way.
+/// The same walk, and back on another path.
 inline Frames walk_there_and_back(double metres) {
   Frames frames = walk_there(metres);
   for (double y = metres; y >= 0; y -= 0.25) frames.push_back(wall_frame(y + 0.06, 0.3));
   return frames;
 }
 
-/// By place, without ids: sets of surfels can be compared.
+/// Sorts surfels by everything but their ids and clears the ids, so that maps can be compared as sets.
 inline std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
   const auto key = [](const Surfel& s) {
     return std::make_tuple(s.position.x(), s.position.y(), s.position.z(), s.normal.x(), s.normal.y(), s.normal.z(), s.radius, s.label,
@@ -62,7 +62,7 @@ inline std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
   return surfels;
 }
 
-/// A folder of its own for each test.
+/// Gives each test its own folder.
 class MapperArchive : public testing::Test {
  protected:
   void SetUp() override {
@@ -73,14 +73,14 @@ class MapperArchive : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(root_); }
 
-  /// All of a mapper's surfels, through a file.
+  /// All surfels of a mapper, in memory and on disk, by saving and reading a file.
   std::vector<Surfel> saved(const Mapper& mapper) const {
     const std::string file = (root_ / "saved.ply").string();
     mapper.save(file);
     return sorted(read_ply(file));
   }
 
-  /// All surfels in the folder, which no mapper uses.
+  /// All surfels in the folder. No mapper may be using it.
   std::vector<Surfel> stored() const {
     const double block_size = block_size_for(walking().z_max);
     const MapFolder folder(path_, block_size);

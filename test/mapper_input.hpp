@@ -20,23 +20,23 @@ namespace frontier_surfels {
 
 using Frames = std::vector<replay::RecordedFrame>;
 
-/// The default mapper for images that come at its working resolution already: rendering fewer pixels is what makes these tests quick.
+/// The default configuration for images that already have the working resolution. Rendering fewer pixels makes these tests quick.
 inline Config undecimated() {
   Config config;
   config.decimation = 1;
   return config;
 }
 
-/// The room's camera after decimation by 4 (and by 8).
+/// The room's camera after decimation by 4, and by 8 (coarse).
 inline Intrinsics working_camera() { return replay::synthetic_camera(160, 120); }
 inline Intrinsics coarse_camera() { return replay::synthetic_camera(80, 60); }
 
-/// fx = fy, the principal point in the middle.
+/// A camera with fx = fy and the principal point in the middle.
 inline Intrinsics plain_camera(int width, int height, double focal_length) {
   return {focal_length, focal_length, (width - 1) / 2.0, (height - 1) / 2.0, width, height};
 }
 
-/// The camera at `eye` looks along `forward` (not vertical), its x axis level; z is up.
+/// Pose of a camera at `eye` that looks along `forward` (not vertical) with its x axis level. World frame with z up.
 inline Eigen::Isometry3d look_along(const Eigen::Vector3d& eye, const Eigen::Vector3d& forward) {
   const Eigen::Vector3d z = forward.normalized(), x = z.cross(Eigen::Vector3d::UnitZ()).normalized();
   Eigen::Matrix3d R;
@@ -53,7 +53,7 @@ inline replay::RecordedFrame plane_frame(const Intrinsics& camera, double depth,
   return frame;
 }
 
-/// What a camera sees of the room [m], exactly.
+/// The exact depths that a camera sees of the room [m].
 inline replay::RecordedFrame room_frame(const replay::Room& room, const Intrinsics& camera, const Eigen::Isometry3d& T_world_camera) {
   replay::RecordedFrame frame = plane_frame(camera, 0, T_world_camera);
   for (int v = 0; v < camera.height; ++v)
@@ -61,7 +61,7 @@ inline replay::RecordedFrame room_frame(const replay::Room& room, const Intrinsi
   return frame;
 }
 
-/// Every `stride`-th frame of a walk of 200 around the room's table.
+/// The first `count` of every `stride`-th frame of a walk around the room's table, which has 200 frames.
 inline Frames orbit_frames(const Intrinsics& camera, int count, int stride = 1) {
   const replay::Room room;
   Frames frames;
@@ -93,7 +93,7 @@ inline std::string text(const scoring::ExactScore& s, std::size_t surfels) {
   return line;
 }
 
-/// All fields alike to the last bit.
+/// Are all fields equal bit by bit?
 inline bool same(const Surfel& a, const Surfel& b) {
   return std::memcmp(a.position.data(), b.position.data(), 3 * sizeof(float)) == 0 &&
          std::memcmp(a.normal.data(), b.normal.data(), 3 * sizeof(float)) == 0 && std::memcmp(&a.radius, &b.radius, sizeof(float)) == 0 &&
@@ -107,7 +107,7 @@ inline testing::AssertionResult same(const std::vector<Surfel>& a, const std::ve
   return testing::AssertionSuccess();
 }
 
-/// What a surfel can be at all: finite, of unit normal, with a radius.
+/// Are all surfels valid (finite, with a unit normal and a positive radius), and do their ids ascend?
 inline testing::AssertionResult all_sound(const std::vector<Surfel>& surfels) {
   for (const Surfel& s : surfels)
     if (!s.position.allFinite() || !(std::abs(s.normal.norm() - 1) < 1e-4F) || !(s.radius > 0) || !std::isfinite(s.radius))
@@ -118,7 +118,7 @@ inline testing::AssertionResult all_sound(const std::vector<Surfel>& surfels) {
   return testing::AssertionSuccess();
 }
 
-/// A subscriber's copy of the map, from its changes alone.
+/// A subscriber's copy of the map, made from changes alone.
 class Follower {
  public:
   void apply(const Changes& changes) {

@@ -1,4 +1,4 @@
-/// Pages of blocks: numbers that are given, taken back and given again.
+/// The index of pages: adding, removing and reusing pages.
 
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ TEST(BlockIndex, CountsPagesUp) {
   EXPECT_EQ(index.used(), 3u);
 }
 
-TEST(BlockIndex, GivesFreePagesAgain) {
+TEST(BlockIndex, ReusesFreePages) {
   BlockIndex index;
   const BlockKey a = {0, 0, 0}, b = {0, 0, 1};
   for (int n = 0; n < 3; ++n) index.add_page(a);
@@ -55,17 +55,17 @@ TEST(BlockIndex, ForgetsBlocksWithoutPages) {
   EXPECT_EQ(index.used(), 0u);
 }
 
-TEST(BlockIndex, TakesOnlyWhatABlockHas) {
+TEST(BlockIndex, RemovesOnlyPagesOfTheBlock) {
   BlockIndex index;
   index.add_page({0, 0, 0});
   index.add_page({1, 0, 0});
-  index.remove_page({0, 0, 0}, 1);  // another's
+  index.remove_page({0, 0, 0}, 1);  // another block's page
   index.remove_page({7, 0, 0}, 0);
   EXPECT_EQ(index.used(), 2u);
   EXPECT_EQ(index.add_page({2, 0, 0}), 2u);
 }
 
-/// Pages that a map had before it was replaced: free, the lowest first, as in a new one.
+/// Pages of a replaced map become free. The lowest is used first, as in a new map.
 TEST(BlockIndex, SkipsToPagesUsedBefore) {
   BlockIndex index;
   index.add_page({0, 0, 0});
@@ -74,11 +74,11 @@ TEST(BlockIndex, SkipsToPagesUsedBefore) {
   EXPECT_EQ(index.used(), 1u);
   for (const std::uint32_t page : {1u, 2u, 3u, 4u}) EXPECT_EQ(index.add_page({1, 0, 0}), page);
   index.skip_to(2);
-  EXPECT_EQ(index.end(), 5u) << "it was further already";
+  EXPECT_EQ(index.end(), 5u) << "end() never decreases";
   EXPECT_EQ(index.used(), 5u);
 }
 
-TEST(BlockIndex, AsASlowBookOfPages) {
+TEST(BlockIndex, AgreesWithASimpleBookOfPages) {
   reference::Random random(1);
   BlockIndex index;
   std::map<BlockKey, Pages> book;
@@ -89,7 +89,7 @@ TEST(BlockIndex, AsASlowBookOfPages) {
     Pages& pages = book[block];
     if (random.chance(step < 10000 ? 0.6 : 0.4)) {
       pages.push_back(index.add_page(block));
-      EXPECT_TRUE(used.insert(pages.back()).second) << "given twice";
+      EXPECT_TRUE(used.insert(pages.back()).second) << "a page is given twice";
     } else if (!pages.empty()) {
       const auto at = pages.begin() + random.whole(0, static_cast<int>(pages.size()) - 1);
       index.remove_page(block, *at);
@@ -98,7 +98,7 @@ TEST(BlockIndex, AsASlowBookOfPages) {
     }
     most = std::max(most, used.size());
     ASSERT_EQ(index.used(), used.size());
-    ASSERT_EQ(index.end(), most) << "free pages first";
+    ASSERT_EQ(index.end(), most) << "free pages are used first";
   }
   for (const auto& [block, pages] : book) {
     const Pages* found = index.find(block);

@@ -1,4 +1,4 @@
-/// Cameras that take turns: each keeps its grid and its tables on the device.
+/// Cameras that take turns keep their grids and tables on the device.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 using reference::cameras;
 using reference::CameraSetup;
 
-TEST(Cameras, ThoseThatTakeTurnsStay) {
+TEST(Cameras, CamerasThatTakeTurnsAreKept) {
   const std::vector<CameraSetup> setups = cameras();
   Cameras list(test_commands(), setups.front().config);
   std::vector<const Camera*> first;
@@ -24,7 +24,7 @@ TEST(Cameras, ThoseThatTakeTurnsStay) {
       EXPECT_EQ(&camera, first[n]);
       EXPECT_TRUE(same_camera(camera.intrinsics(), setups[n].intrinsics));
     }
-  EXPECT_EQ(test_commands().allocated_bytes(), bytes) << "tables are made again";
+  EXPECT_EQ(test_commands().allocated_bytes(), bytes) << "tables are made anew";
 }
 
 TEST(Cameras, EveryIntrinsicCounts) {
@@ -43,7 +43,7 @@ TEST(Cameras, EveryIntrinsicCounts) {
 }
 
 /// A driver whose intrinsics change with every image must not fill the memory.
-TEST(Cameras, TheirNumberIsBounded) {
+TEST(Cameras, NumberIsBounded) {
   const CameraSetup setup = cameras().front();
   Cameras list(test_commands(), setup.config);
   Intrinsics intrinsics = setup.intrinsics;
@@ -56,7 +56,7 @@ TEST(Cameras, TheirNumberIsBounded) {
   EXPECT_EQ(test_commands().allocated_bytes(), after_many);
 }
 
-TEST(Cameras, OneThatIsRefusedIsForgotten) {
+TEST(Cameras, ARefusedCameraIsForgotten) {
   const CameraSetup setup = cameras().front();
   Cameras list(test_commands(), setup.config);
   Intrinsics absurd = setup.intrinsics;

@@ -27,12 +27,12 @@ std::string all_problems(const Config& config) {
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-/// A YAML file that goes when the test ends.
+/// A YAML file that is removed when the test ends.
 class ConfigFile : public testing::Test {
  protected:
   void TearDown() override { fs::remove(path_); }
 
-  /// What load_config says of a file with this text; "" if it takes it.
+  /// Message of load_config's error for a file with this text; "" without an error.
   std::string fault(const std::string& text) {
     write(text);
     try {
@@ -58,7 +58,7 @@ std::string read_text(const std::string& path) {
 
 TEST(Config, DefaultsHaveNoProblems) { EXPECT_EQ(all_problems(Config()), ""); }
 
-TEST(Config, EveryFieldHasANameOfItsOwnAndAMeaning) {
+TEST(Config, EveryFieldHasAUniqueNameAndAMeaning) {
   std::set<std::string> names;
   Config config;
   for_each_field(config, [&](const FieldInfo& info, const auto&) {
@@ -185,7 +185,7 @@ TEST_F(ConfigFile, EveryFaultWithItsLine) {
                 path_ + ":6: z_max is given twice: keep one.\n" + path_ + ":7: platform is empty: it must be text.");
 }
 
-TEST_F(ConfigFile, RefusesWhatIsNoMap) {
+TEST_F(ConfigFile, RefusesFilesThatAreNotOneMap) {
   EXPECT_EQ(fault("- z_max: 5\n"), path_ + ":1: this must be a map of parameters, one 'name: value' a line.");
   EXPECT_TRUE(contains(fault("z_max: 5\n  z_min: {\n"), path_ + ":2: this is not YAML: ")) << fault("z_max: 5\n  z_min: {\n");
   EXPECT_EQ(fault("z_max: 5\n---\nz_max: 6\n"), path_ + " holds several YAML documents: keep one.");
@@ -232,7 +232,7 @@ TEST_F(ConfigFile, RoundTripIsExact) {
   EXPECT_TRUE(std::isnan(loaded_.z_max));
 }
 
-TEST(Config, NumbersAreWrittenForPeople) { EXPECT_TRUE(contains(to_yaml(Config()), "\nz_max: 3\n")) << to_yaml(Config()); }
+TEST(Config, NumbersAreWrittenShortly) { EXPECT_TRUE(contains(to_yaml(Config()), "\nz_max: 3\n")) << to_yaml(Config()); }
 
 TEST(ShippedFiles, MapperYamlIsTheDefaults) {
   EXPECT_EQ(to_yaml(load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/mapper.yaml")), to_yaml(Config()));
@@ -253,7 +253,7 @@ TEST(ShippedFiles, PaperYamlIsTable1) {
 
 TEST(ShippedFiles, ParametersMdHasTheTables) {
   EXPECT_TRUE(contains(read_text(FRONTIER_SURFELS_SOURCE_DIR "/doc/parameters.md"), parameter_table()))
-      << "doc/parameters.md is old. Renew it with: replay_score --parameters > doc/parameters.md";
+      << "doc/parameters.md is out of date. Renew it with: replay_score --parameters > doc/parameters.md";
 }
 
 TEST(ParameterTable, HasAHeadingForEachGroup) {

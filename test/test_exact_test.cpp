@@ -1,4 +1,4 @@
-/// The exact test on a scene whose answers are known by hand.
+/// The exact test on a scene whose answers are computed by hand.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,13 +17,13 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// One camera at the origin, 160 x 120 pixels: left of x = 0 it measures a wall at 1 m, right of it one at 1.5 m. Known space ends
-// at the walls, at the step between them (x = 0, z from 1 to 1.5 m) and at the sides of the image.
+// One camera of 160 x 120 pixels at the origin. It measures a wall at 1 m where x < 0, and a wall at 1.5 m where x > 0. Known space ends at
+// the walls, at the step between them (x = 0, z from 1 to 1.5 m) and at the sides of the image.
 
 constexpr double kLeft = 1.0, kRight = 1.5;         // [m]
-constexpr double kSide = 0.8, kTop = 0.6;           // x/z, y/z of the sides of the image
+constexpr double kSide = 0.8, kTop = 0.6;           // x / z and y / z of the image's sides
 const Vector3d kSideInward(1, 0, kSide);            // normal of the left side, not of unit length
-const Vector3d kTowards(0, 0, -1), kAway(0, 0, 1);  // the camera
+const Vector3d kTowards(0, 0, -1), kAway(0, 0, 1);  // towards the camera, away from it
 
 ExactTest step_scene() {
   OwnedFrame frame({100, 100, 79.5, 59.5, 160, 120}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 6, false);
@@ -37,9 +37,9 @@ ExactTest step_scene() {
 
 struct KnownSurfel {
   const char* what;
-  Surfel surfel;  // of radius 10 mm: voxel 11.5 mm
+  Surfel surfel;  // with a radius of 10 mm, hence a voxel of 11.5 mm
   Verdict verdict;
-  double distance;  // [m], of the nearest unknown -> known step
+  double distance;  // to the nearest step from unknown to known along the normal [m]
 };
 
 std::vector<KnownSurfel> known_surfels() {
@@ -104,7 +104,7 @@ TEST(ExactTest, DepthsOutsideTheRangeAreNoMeasurements) {
   }
 }
 
-TEST(ExactTest, UsesEverySoManyPixels) {
+TEST(ExactTest, DecimatesLikeTheMapper) {
   OwnedFrame frame({100, 80, 3, 5, 11, 14}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 3, true);
   for (int t = 0; t < 14; t += 4) {
     for (int s = 0; s < 11; s += 4) frame.set(s, t, 1 + 0.1 * (s / 4) + 0.01 * (t / 4));
@@ -160,7 +160,7 @@ TEST(ExactTest, SharesAreOfAllSurfels) {
   EXPECT_DOUBLE_EQ(score.fdr_5cm, 8 / 22.0);
 }
 
-/// Distance of a point from each part of the scene's boundary [m]; the parts are taken as endless planes.
+/// Distance of a point from each part of the scene's boundary [m]. The parts count as infinite planes.
 struct PlaneDistances {
   double left_wall, right_wall, step, sides;
   explicit PlaneDistances(const Vector3d& p)
@@ -181,7 +181,7 @@ TEST(ExactTest, FindsTheBoundaryOfTheScene) {
     const double wall = p.x() < 0 ? to.left_wall : to.right_wall;
     const bool step_here = p.z() > kLeft - 1e-4 && p.z() < kRight + 1e-4;
     EXPECT_LT(std::min({wall, step_here ? to.step : kInf, to.sides}), 1e-4) << p.transpose();
-    // What is behind a point is certain where no other part of the boundary is near.
+    // The label of a point is certain if no other part of the boundary is near.
     if (to.sides > 0.01 && to.step > 0.01) {
       EXPECT_TRUE(point.occupied) << p.transpose();
       ++on_wall;
@@ -198,7 +198,7 @@ TEST(ExactTest, FindsTheBoundaryOfTheScene) {
   EXPECT_GT(on_side, 500u);
 }
 
-/// Boundary points on a sheet of unknown between what two cameras that face each other have seen.
+/// Number of boundary points on the sheet of unknown space between two cameras that face each other.
 std::size_t points_on_sheet(double thickness) {
   ExactTest test(0.5, 3, 1);
   Eigen::Isometry3d facing(Eigen::Translation3d(0, 0, 2 + thickness));
@@ -216,7 +216,7 @@ std::size_t points_on_sheet(double thickness) {
 }
 
 TEST(ExactTest, ThinSheetsOfUnknownAreNoBoundary) {
-  // A ray that leaves 4 mm only after 2 cm is rare, one that leaves 17 mm within 2 cm is common, and none leaves 22 mm so soon.
+  // Few rays need 2 cm to leave a sheet of 4 mm, many leave one of 17 mm within 2 cm, and none leaves one of 22 mm within 2 cm.
   const double thick = static_cast<double>(points_on_sheet(0.03));
   EXPECT_GT(thick, 500);
   EXPECT_LT(points_on_sheet(0.004), 0.1 * thick);
@@ -236,7 +236,7 @@ void add_grid(std::vector<Surfel>& surfels, const std::function<Vector3d(double,
   }
 }
 
-/// Surfels everywhere on the scene's boundary.
+/// Surfels on all of the scene's boundary.
 std::vector<Surfel> all_of_the_boundary() {
   const auto occupied = [](const Vector3d&) { return Label::kOccupied; };
   const auto frontier = [](const Vector3d&) { return Label::kFrontier; };
@@ -248,7 +248,7 @@ std::vector<Surfel> all_of_the_boundary() {
   add_grid(
       surfels, [&](double a, double b) -> Vector3d { return Vector3d(mix(0, kSide, a), mix(-kTop, kTop, b), 1) * kRight; }, kTowards,
       occupied);
-  // The first 3 cm of the step are seen just behind the left wall.
+  // The first 3 cm of the step lie just behind the left wall and count as occupied.
   add_grid(
       surfels, [&](double a, double b) -> Vector3d { return Vector3d(0, mix(-kTop, kTop, a) * kRight, mix(kLeft, kRight, b)); }, {1, 0, 0},
       [](const Vector3d& p) { return p.z() < kLeft + 0.03 ? Label::kOccupied : Label::kFrontier; });
@@ -275,7 +275,7 @@ TEST(ExactTest, CompleteMapMissesNothing) {
   EXPECT_EQ(score.miss_1cm, 0);
   EXPECT_EQ(score.miss_2cm, 0);
   EXPECT_EQ(score.miss_5cm, 0);
-  EXPECT_GT(score.label_ok, 0.99);  // Where two parts meet, the nearest surfel may be the other one's.
+  EXPECT_GT(score.label_ok, 0.99);  // where two parts meet, the nearest surfel may belong to the other part
 
   for (Surfel& surfel : surfels) surfel.label = surfel.label == Label::kOccupied ? Label::kFrontier : Label::kOccupied;
   EXPECT_NEAR(test.score(surfels, 10000, 2).label_ok, 1 - score.label_ok, 1e-12);
@@ -285,14 +285,14 @@ TEST(ExactTest, MissingWallIsMissed) {
   const ExactTest test = step_scene();
   std::vector<Surfel> surfels;
   for (const Surfel& surfel : all_of_the_boundary()) {
-    if (surfel.position.z() < kRight - 1e-4) surfels.push_back(surfel);  // Everything but the farther wall.
+    if (surfel.position.z() < kRight - 1e-4) surfels.push_back(surfel);  // all but the farther wall
   }
   std::size_t beyond_1cm = 0, beyond_2cm = 0, beyond_5cm = 0;
   const auto boundary = test.boundary(10000, ExactTest::kSeed);
   for (const BoundaryPoint& point : boundary) {
     const PlaneDistances to(point.position);
     if (to.right_wall > 1e-4) continue;
-    const double rest = std::min(to.step, to.sides);  // up to the 4 mm between surfels
+    const double rest = std::min(to.step, to.sides);  // distance to the other parts, up to the 4 mm between surfels
     beyond_1cm += rest > 0.01;
     beyond_2cm += rest > 0.02;
     beyond_5cm += rest > 0.05;
@@ -352,7 +352,7 @@ TEST(ExactTest, RefusesFramesThatCannotBeUsed) {
   EXPECT_THROW(ExactTest(0.5, 3, 0), Error);
 }
 
-TEST(ExactTest, ProgressIsToldToTheCallerAndCanStop) {
+TEST(ExactTest, ProgressIsReportedOnTheCallersThreadAndCanStop) {
   const ExactTest test = step_scene();
   const std::vector<Surfel> surfels = all_of_the_boundary();
   std::vector<double> shares;

@@ -1,4 +1,4 @@
-/// The exact test on random views and surfels against its definition, written down once more and as slowly as it comes.
+/// The exact test on random views and surfels, compared with a slow and literal implementation of its definition.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 struct SlowView {
   Intrinsics camera;
   Eigen::Isometry3d T_world_camera;
-  std::vector<double> depth;  // of all pixels [m], NaN: no measurement
+  std::vector<double> depth;  // depth of each pixel [m]; NaN: no measurement
 };
 
 struct RandomScene {
@@ -76,7 +76,7 @@ RandomScene random_scene() {
   return scene;
 }
 
-/// The measured depth at a point's pixel and the point's own, if it has such a pixel.
+/// Finds the measured depth at a point's pixel and the point's own depth. @return whether the point has a pixel with a measurement
 bool slow_look(const SlowView& view, const Vector3d& p_world, double& depth, double& z) {
   const double n = RandomScene::kDecimation;
   const Vector3d p = view.T_world_camera.inverse() * p_world;
@@ -112,7 +112,7 @@ Verdict slow_verdict(const RandomScene& scene, const Surfel& surfel) {
   return front ? Verdict::kRight : Verdict::kFloating;
 }
 
-/// The part of the score that is about surfels.
+/// The part of the score that concerns surfels.
 ExactScore slow_surfel_score(const RandomScene& scene, const std::vector<Verdict>& verdicts) {
   ExactScore score;
   const double one = 1.0 / scene.surfels.size();
@@ -130,7 +130,7 @@ ExactScore slow_surfel_score(const RandomScene& scene, const std::vector<Verdict
   return score;
 }
 
-/// The part of the score that is about the boundary.
+/// The part of the score that concerns the boundary.
 ExactScore slow_boundary_score(const RandomScene& scene, const std::vector<BoundaryPoint>& boundary) {
   ExactScore score;
   double labelled = 0;
@@ -171,7 +171,7 @@ void expect_equal(const ExactScore& a, const ExactScore& b, double tolerance) {
   EXPECT_NEAR(a.label_ok, b.label_ok, tolerance);
 }
 
-TEST(ExactTestRandom, AgreesWithTheSlowObviousWay) {
+TEST(ExactTestRandom, AgreesWithTheSlowImplementation) {
   const RandomScene scene = random_scene();
   ASSERT_GT(scene.surfels.size(), 3000u);
   std::vector<Verdict> verdicts, expected_verdicts;
@@ -189,7 +189,7 @@ TEST(ExactTestRandom, AgreesWithTheSlowObviousWay) {
   EXPECT_EQ(score.boundary_points, boundary.size());
   expect_equal(score, expected, 1e-9);
   for (const double share : {score.right, score.buried, score.floating, score.flipped, score.within_1v, score.miss_2cm, score.label_ok}) {
-    EXPECT_GT(share, 0.02);  // Every outcome takes part in the comparison.
+    EXPECT_GT(share, 0.02);  // every outcome occurs in the comparison
     EXPECT_LT(share, 0.98);
   }
 }

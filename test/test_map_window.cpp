@@ -1,4 +1,4 @@
-/// The window of a view: every block with a surfel that may reach into the grid is in it, whatever the camera and its pose.
+/// The window of a view: for any camera and pose it contains every block with a surfel that may reach into the grid.
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,13 @@ namespace {
 
 using namespace reference;
 
-/// Centre (grid coordinates) of a surfel of radius r [m] with a normal (camera frame) in whose ellipsoid a point of the grid's coordinates
-/// lies, `along` of its thickness along the normal and `across` of its reach in the disc. Found by iteration, as the ellipsoid's shape
-/// depends on where its centre is. @return whether there is one
+/// Finds the centre (grid coordinates) of a surfel whose ellipsoid contains a point (grid coordinates). Iterates, because the ellipsoid's
+/// shape depends on the position of its centre.
+/// @param r       radius [m]
+/// @param normal  camera frame
+/// @param along   distance between centre and point along the normal, in units of the thickness
+/// @param across  offset between centre and point in the disc, in units of its reach
+/// @return whether there is such a centre
 bool center_around(const Nuvg& grid, double thickness, const Vector3d& point, double r, const Vector3d& normal, double along,
                    const Vector3d& across, Vector3d* center) {
   *center = point;
@@ -31,7 +35,7 @@ bool center_around(const Nuvg& grid, double thickness, const Vector3d& point, do
   return false;
 }
 
-/// A point in the grid or one voxel beside it, often on the very border.
+/// A point in the grid or one voxel beside it, often exactly on that border.
 Vector3d point_of_grid(const Nuvg& grid, Random& random) {
   const double sizes[] = {double(grid.size_i), double(grid.size_j), double(grid.size_k)};
   Vector3d point;
@@ -47,7 +51,7 @@ struct Tally {
   double met = 0, cells = 0;
 };
 
-/// @param largest  radius that surfels of the map have [m]; 0: what this view's own may have
+/// @param largest  largest radius of the map's surfels [m]; 0: the largest radius of surfels that this view creates
 void check(const CameraSetup& camera, const Eigen::Isometry3d& T_world_camera, double largest, Random& random, Tally& tally) {
   const Nuvg grid(camera.intrinsics, camera.config);
   FrameFixture fixture(camera.config);
@@ -72,8 +76,8 @@ void check(const CameraSetup& camera, const Eigen::Isometry3d& T_world_camera, d
     if (!center_around(grid, camera.config.thickness, point_of_grid(grid, random), r, normal, std::cos(angle), std::sin(angle) * in_disc,
                        &center))
       continue;
-    // In the grid none is larger than 7 voxels; beyond it far larger ones are bent so much that what reaches into the grid says nothing,
-    // unless they lie across the view.
+    // Surfels in the grid reach at most 7 voxels. Much larger ones beyond it are distorted so strongly that the test means nothing, except
+    // for surfels that lie across the view.
     constexpr double kLargest = 12;
     const Vector3d p_camera = grid.from_grid(center);
     if (!across_view && 2 * r > kLargest * grid.voxel_size(p_camera.z())) continue;
@@ -94,7 +98,7 @@ TEST(MapWindow, HasEveryBlockThatReachesIntoTheGrid) {
   Tally tally;
   Random random(1);
   std::vector<CameraSetup> all = cameras();
-  all.push_back(make_camera(200, 100, 130, 130, 200));  // a wide cuboid before the pyramid, and fine voxels
+  all.push_back(make_camera(200, 100, 130, 130, 200));  // a wide cuboid in front of the pyramid, and fine voxels
   all.back().config.z_min = 1.8;
   all.back().config.z_max = 3;
   for (const CameraSetup& camera : all)
@@ -106,10 +110,10 @@ TEST(MapWindow, HasEveryBlockThatReachesIntoTheGrid) {
         check(camera, T_world_camera, largest, random, tally);
       }
   EXPECT_GT(tally.surfels, 5000) << "nothing was tested";
-  EXPECT_LT(tally.met, 0.9 * tally.cells) << "blocks in the window's corners are spared";
+  EXPECT_LT(tally.met, 0.9 * tally.cells) << "too few blocks in the window's corners are left out";
 }
 
-/// Only rotations and translations that floats hold: the local frame and its pose are then the same to the last bit.
+/// Floats hold these rotations and translations exactly, so the camera's pose in the local frame must be the same bit by bit.
 TEST(MapWindow, IsTheSameAnywhere) {
   const CameraSetup camera = cameras().front();
   Random random(2);
@@ -134,8 +138,8 @@ TEST(MapWindow, IsTheSameAnywhere) {
   }
 }
 
-/// What a frame works on must not depend on which of the two ways finds it.
-TEST(MapWindow, BlocksNearAreThoseThatAreNear) {
+/// A frame must get the same blocks from blocks_near() and from is_near().
+TEST(MapWindow, BlocksNearAndIsNearAgree) {
   Random random(3);
   const CameraSetup camera = cameras().front();
   FrameFixture fixture(camera.config);

@@ -1,4 +1,4 @@
-/// Maps larger than memory: with a map folder, a map is what it would be without, wherever its blocks are.
+/// Maps larger than memory: with a map folder the map is the same as without, wherever its blocks are.
 #include "mapper_archive_input.hpp"
 
 namespace frontier_surfels {
@@ -34,7 +34,7 @@ TEST_F(MapperArchive, ThereAndBackGivesTheSameMap) {
     late.apply(mapper.changes(0));
     ASSERT_TRUE(same(late.surfels(), near));
   }
-  EXPECT_GT(removed, 1000u) << "the way back must change what has been away";
+  EXPECT_GT(removed, 1000u) << "the way back must change blocks that had left memory";
   EXPECT_GT(moves, frames.size() / 2);
   EXPECT_LT(mapper.size(), plain.size() / 2);
 }
@@ -54,7 +54,7 @@ TEST_F(MapperArchive, MemoryIsBoundedAndTheFolderGrows) {
   EXPECT_GT(saved(mapper).size(), 4 * mapper.size());
 }
 
-/// The known space is wider than eviction_radius where the image is.
+/// The image is so wide that its known space is wider than eviction_radius.
 TEST_F(MapperArchive, AWideViewKeepsWhatItNeeds) {
   Frames frames;
   for (const double y : {0.0, 6.0, 12.0, 6.1, 0.1})
@@ -67,7 +67,7 @@ TEST_F(MapperArchive, AWideViewKeepsWhatItNeeds) {
   }
 }
 
-TEST_F(MapperArchive, ReopenedItGoesOnWhereItWas) {
+TEST_F(MapperArchive, AReopenedFolderGoesOnWithItsMap) {
   const Frames frames = walk_there(12);
   std::vector<Surfel> before;
   Report first;
@@ -77,21 +77,21 @@ TEST_F(MapperArchive, ReopenedItGoesOnWhereItWas) {
     integrate_all(mapper, {frames.begin() + 1, frames.end()});
     before = saved(mapper);
   }
-  EXPECT_TRUE(same(stored(), before)) << "ended in order, nothing is missing";
+  EXPECT_TRUE(same(stored(), before)) << "a mapper that ends normally stores everything";
 
   Mapper mapper(walking(path_));
   EXPECT_EQ(mapper.size(), 0u) << "nothing is near before the first frame";
   EXPECT_TRUE(same(saved(mapper), before));
   const Report again = mapper.integrate(frames[0].view());
   EXPECT_GT(again.surfels, first.surfels);
-  EXPECT_LT(mapper.size(), before.size()) << "only what is near";
-  EXPECT_LT(again.created, first.created / 30) << "known already";
+  EXPECT_LT(mapper.size(), before.size()) << "only near blocks are in memory";
+  EXPECT_LT(again.created, first.created / 30) << "the space is known already";
   for (const auto& frame : frames) mapper.integrate(frame.view());
   const auto after = static_cast<double>(saved(mapper).size());
   EXPECT_NEAR(after / static_cast<double>(before.size()), 1, 0.03);
 }
 
-TEST_F(MapperArchive, AResetOrLoadReplacesWhatIsOnDiskToo) {
+TEST_F(MapperArchive, ResetAndLoadReplaceTheMapOnDiskToo) {
   const Frames frames = walk_there(15);
   const std::string file = (root_ / "first.ply").string();
   Mapper first(walking());
@@ -111,7 +111,7 @@ TEST_F(MapperArchive, AResetOrLoadReplacesWhatIsOnDiskToo) {
     follower.apply(mapper.changes(0));
     EXPECT_TRUE(same(follower.surfels(), mapper.surfels()));
   }
-  EXPECT_TRUE(same(stored(), sorted(first.surfels()))) << "without a frame after it";
+  EXPECT_TRUE(same(stored(), sorted(first.surfels()))) << "a load is stored even if no frame follows";
 
   const std::vector<Surfel> all = [&] {
     Mapper mapper(walking());
@@ -122,7 +122,7 @@ TEST_F(MapperArchive, AResetOrLoadReplacesWhatIsOnDiskToo) {
     Mapper mapper(walking(path_));
     mapper.load(all);
     mapper.integrate(plane_frame(plain_camera(40, 30, 36), 0, frames[0].T_world_camera).view());
-    EXPECT_LT(mapper.size(), all.size()) << "a large map leaves memory where it is not needed";
+    EXPECT_LT(mapper.size(), all.size()) << "far blocks of a loaded map leave memory";
     EXPECT_TRUE(same(saved(mapper), sorted(all)));
     mapper.reset();
   }

@@ -1,4 +1,4 @@
-/// Map folders whose mapper is killed, whose disk is full or damaged, or that cannot be used.
+/// Faults of map folders: a killed mapper, a full disk, damaged blocks, unusable folders.
 #include <fcntl.h>
 #include <sys/wait.h>
 
@@ -16,11 +16,11 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr char kFolder[] = "FRONTIER_SURFELS_TEST_FOLDER";  // where the child maps
+constexpr char kFolder[] = "FRONTIER_SURFELS_TEST_FOLDER";  // folder in which the child maps
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-/// The child of the test below: maps at a camera's rate, and tells of every frame.
+/// Child process of the next test: maps at a camera's rate and appends a byte to a file after every frame.
 TEST(MapperArchiveChild, DISABLED_MapsUntilItIsKilled) {
   const char* folder = std::getenv(kFolder);
   if (folder == nullptr) GTEST_SKIP() << "Only for the test that kills it.";
@@ -36,7 +36,7 @@ TEST(MapperArchiveChild, DISABLED_MapsUntilItIsKilled) {
   for (;;) pause();
 }
 
-/// A child with an OpenCL of its own. @return its process id
+/// Starts this program anew as a child, so that it initialises OpenCL itself. @return its process id
 pid_t start_child(const std::string& folder) {
   setenv(kFolder, folder.c_str(), 1);
   const pid_t child = fork();
@@ -47,8 +47,8 @@ pid_t start_child(const std::string& folder) {
   _exit(1);
 }
 
-TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
-  std::vector<std::vector<Surfel>> maps = {{}};  // after each frame; old ones are forgotten
+TEST_F(MapperArchive, AfterAKillTheFolderHoldsTheMapOfARecentFrame) {
+  std::vector<std::vector<Surfel>> maps = {{}};  // after each frame; old ones are dropped
   Mapper mapper(walking());
   const Frames frames = walk_there_and_back(30);
   std::mt19937 random(5);
@@ -61,7 +61,7 @@ TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
     kill(child, SIGKILL);
     int status = 0;
     waitpid(child, &status, 0);
-    ASSERT_TRUE(WIFSIGNALED(status)) << "it ended by itself";
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the child ended by itself";
     const std::size_t last = count();
     ASSERT_GE(last, wanted);
 
@@ -73,8 +73,8 @@ TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
     }
     std::size_t n = maps.size();
     while (n > 0 && (found.size() != maps[n - 1].size() || !same(found, sorted(maps[n - 1])))) --n;
-    ASSERT_GT(n, 0u) << "killed after frame " << last << ": the map is none of any frame";
-    EXPECT_GE(n - 1 + 30, last) << "more is lost than allowed";
+    ASSERT_GT(n, 0u) << "killed after frame " << last << ": the folder holds the map of no frame";
+    EXPECT_GE(n - 1 + 30, last) << "too many frames are lost";
     std::cout << "killed after frame " << last << ", the folder holds the map after frame " << n - 1 << "\n";
 
     Mapper again(walking(path_));
@@ -84,7 +84,7 @@ TEST_F(MapperArchive, KilledItHoldsTheMapOfOneOfTheLastFrames) {
   }
 }
 
-/// Frames are refused now and then, nothing is lost, and mapping goes on when there is room again.
+/// On a full disk some frames are refused, nothing is lost, and mapping goes on when there is room again.
 TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
   const Frames frames = walk_there_and_back(20);
   Mapper plain(walking());
@@ -119,7 +119,7 @@ TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
   std::cout << refused << " of " << frames.size() << " frames refused: " << said << "\n";
 }
 
-/// Some blocks come, then one cannot be read: the frame is refused, and changes() tells what has come.
+/// Some blocks enter memory, then one cannot be read: the frame is refused, and changes() reports the blocks that have entered.
 TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   const Frames there = walk_there(20), all = walk_there_and_back(20);
   Mapper plain(walking()), mapper(walking(path_));
@@ -136,14 +136,14 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
       const std::vector<Surfel> before = mapper.surfels();
       const std::string said = fault_of<FileError>([&] { mapper.integrate(there.front().view()); });
       EXPECT_TRUE(contains(said, "cannot be read (its checksum does not fit)")) << said;
-      EXPECT_EQ(!same(before, mapper.surfels()), tries == 0) << "blocks have moved";
+      EXPECT_EQ(!same(before, mapper.surfels()), tries == 0) << "blocks move at the first try only";
       const Changes changes = mapper.changes(follower.sequence());
       EXPECT_EQ(changes.sequence, n);
       follower.apply(changes);
       ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "after a refused frame";
       ++refused;
     }
-    if (now) damage();  // and whole again
+    if (now) damage();  // the second inversion restores the checksums
     mapper.integrate(all[n].view());
     follower.apply(mapper.changes(follower.sequence()));
     ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "frame " << n;
@@ -152,7 +152,7 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   EXPECT_TRUE(same(saved(mapper), sorted(plain.surfels())));
 }
 
-/// The views that a frame has failed in are forgotten: blocks that have moved since are not taken for empty ones.
+/// A failed frame leaves no view behind: blocks that leave memory later must not be taken for unknown ones.
 TEST_F(MapperArchive, BadFramesBetweenChangeNothing) {
   const Frames frames = walk_there_and_back(12);
   Mapper plain(walking()), mapper(walking(path_));

@@ -1,4 +1,4 @@
-/// Unusable frames, configurations and devices: one clear sentence, and the map stays as it was.
+/// Unusable frames, configurations and devices give one clear sentence, and the map stays as it was.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -15,7 +15,7 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 
 struct Fault {
   const char* name;
-  const char* said;  ///< part of the sentence
+  const char* said;  ///< part of the error's sentence
   std::function<void(DepthFrame&)> spoil;
 };
 
@@ -52,7 +52,7 @@ const Fault kFaults[] = {
     {"focal length beyond all", "voxels", [](DepthFrame& f) { f.intrinsics.fx = 1e300; }},
 };
 
-/// A sentence: it begins with a capital letter, ends as one and says more than a word.
+/// Expects a sentence: a capital letter, more than a word, and a full stop or question mark.
 void expect_sentence(const std::string& text) {
   ASSERT_GT(text.size(), 20u) << text;
   EXPECT_TRUE(std::isupper(static_cast<unsigned char>(text.front()))) << text;
@@ -80,10 +80,10 @@ TEST(MapperBadInput, EveryBadFrameIsNamedAndChangesNothing) {
   }
   EXPECT_EQ(mapper.integrate(frames[3].view()).sequence, 4u);
   untroubled.integrate(frames[3].view());
-  EXPECT_TRUE(same(mapper.surfels(), untroubled.surfels())) << "a bad frame left something behind";
+  EXPECT_TRUE(same(mapper.surfels(), untroubled.surfels())) << "a bad frame has changed the next one's result";
 }
 
-TEST(MapperBadInput, ABadFirstFrameIsForgotten) {
+TEST(MapperBadInput, ABadFirstFrameLeavesNothingBehind) {
   const Frames frames = orbit_frames(coarse_camera(), 2, 5);
   Mapper mapper(undecimated());
   for (const Fault& fault : kFaults) {
@@ -96,7 +96,7 @@ TEST(MapperBadInput, ABadFirstFrameIsForgotten) {
   EXPECT_TRUE(same(mapper.surfels(), map_of(frames, undecimated())));
 }
 
-/// Cameras that nobody has: refused, or mapped without a number that is none.
+/// Absurd cameras are refused, or mapped with valid surfels only.
 TEST(MapperBadInput, DegenerateCamerasMakeNoUnsoundSurfel) {
   const Frames frames = orbit_frames(coarse_camera(), 1);
   Mapper mapper(undecimated());
@@ -119,7 +119,7 @@ TEST(MapperBadInput, DegenerateCamerasMakeNoUnsoundSurfel) {
   }
 }
 
-TEST(MapperBadInput, PicturesSmallerThanTheDecimation) {
+TEST(MapperBadInput, ImagesSmallerThanTheDecimation) {
   Config config;
   config.decimation = 8;
   Mapper mapper(config);
@@ -159,7 +159,7 @@ TEST(MapperBadInput, EveryFaultOfAConfigurationIsListed) {
     EXPECT_TRUE(contains(said, name)) << name << " is not in:\n" << said;
 }
 
-TEST(MapperBadInput, DevicesThatAreNotThere) {
+TEST(MapperBadInput, MissingDevices) {
   const std::string device = Mapper(undecimated()).device();
   Config platform, index;
   platform.platform = "no such platform";

@@ -1,4 +1,4 @@
-/// The map under all kinds of cameras and ways to move them.
+/// Maps of many kinds of cameras and motions.
 #include <gtest/gtest.h>
 
 #include "mapper_input.hpp"
@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What the exact score must reach where voxels are at most 2 cm large.
+/// Limits of the exact score for voxels of at most 2 cm.
 struct Limits {
   double right = 0.95, within_2v = 0.99, fdr_5cm = 0.005, miss_2cm = 0.002, miss_5cm = 0.0005, label_ok = 0.97;
 };
@@ -35,7 +35,7 @@ TEST(MapperCameras, PrincipalPointFarOffTheCentre) {
 
 TEST(MapperCameras, FieldOfView15Degrees) {
   Limits limits;
-  limits.fdr_5cm = 0.008;  // the pyramids' tips, thinner than a voxel, are much of so slender a map
+  limits.fdr_5cm = 0.008;  // the tips of the view pyramids, thinner than a voxel, are a large part of such a narrow map
   expect_score(orbit_frames(plain_camera(80, 60, 304), 6, 1), undecimated(), limits);
 }
 
@@ -72,7 +72,7 @@ TEST(MapperCameras, LongRange) {
   Config config = undecimated();
   config.z_max = 8;
   Limits limits;
-  limits.miss_2cm = 0.015;  // voxels are 4 cm large where the room ends
+  limits.miss_2cm = 0.015;  // voxels of 4 cm at the room's far end
   expect_score(orbit_frames(working_camera(), 6, 6), config, limits);
 }
 
@@ -85,7 +85,7 @@ TEST(MapperCameras, SizeAndIntrinsicsChangeFromFrameToFrame) {
   expect_score(frames, undecimated());
 }
 
-/// Every lost pixel is a needle of unknown space, as thin as a voxel, until another frame looks there: most of the map is made of these.
+/// Every lost pixel is a needle of unknown space, one voxel thin, until another frame looks there. Most of the map consists of needles.
 TEST(MapperCameras, AQuarterOfThePixelsInvalid) {
   Frames frames = orbit_frames(plain_camera(80, 60, 131), 8, 1);
   cv::RNG random(5);
@@ -104,7 +104,7 @@ TEST(MapperCameras, ThePapersMethodAlone) {
   expect_score(orbit_frames(working_camera(), 6, 4), config);
 }
 
-/// Vertical poles of 3 cm, 1.5 m away, before a wall at 2.5 m; the camera passes by.
+/// Vertical poles of 3 cm diameter, 1.5 m away, in front of a wall at 2.5 m. The camera passes by.
 constexpr double kPoleRadius = 0.015, kPoleDepth = 1.5;
 const double kPoles[] = {-0.6, -0.2, 0.1, 0.5};
 
@@ -149,7 +149,7 @@ TEST(MapperCameras, TowardsAWall) {
     frames.push_back(plane_frame(camera, depth, Eigen::Isometry3d(Eigen::Translation3d(0, 0, wall - depth))));
     split += mapper.integrate(frames.back().view()).split;
   }
-  EXPECT_GT(split, 0U) << "voxels are five times larger from the first position than from the last";
+  EXPECT_GT(split, 0U) << "voxels at the wall are five times larger from the first position than from the last";
 
   const std::vector<Surfel> surfels = mapper.surfels();
   const auto s = score(surfels, frames, undecimated());
@@ -163,7 +163,7 @@ TEST(MapperCameras, TowardsAWall) {
   for (const Surfel& surfel : surfels) {
     if (surfel.label != Label::kOccupied) continue;
     EXPECT_NEAR(surfel.position.z(), wall, 1.5 * wall / focal);
-    EXPECT_LT(surfel.normal.z(), -0.5F) << "towards the camera";
+    EXPECT_LT(surfel.normal.z(), -0.5F) << "normals point towards the camera";
   }
 }
 

@@ -17,7 +17,7 @@ const Surfel* find(const Map& map, std::uint32_t id) {
   return found != map.end() && found->id == id ? &*found : nullptr;
 }
 
-/// A mapper that has done all that it can do, and its map at every sequence number.
+/// A mapper after all kinds of operations, and its map at every sequence number.
 class MapperChanges : public testing::Test {
  protected:
   void SetUp() override {
@@ -27,7 +27,7 @@ class MapperChanges : public testing::Test {
     for (int n = 0; n < 4; ++n) integrate(frames[n]);
     mapper_.save(path_);
     integrate(frames[4]);
-    mapper_.load(path_);  // smaller than the map, so that ids are left over
+    mapper_.load(path_);  // a smaller map, so that some ids become free
     note();
     integrate(frames[5]);
     integrate(plane_frame(coarse_camera(), 0, replay::orbit_pose(0, 200)));  // nothing changes
@@ -66,7 +66,7 @@ class MapperChanges : public testing::Test {
   std::size_t split_ = 0;
 };
 
-TEST_F(MapperChanges, LeadFromAnyMapToThisOne) {
+TEST_F(MapperChanges, LeadFromAnyEarlierMapToThisOne) {
   EXPECT_GT(split_, 0u);
   for (std::uint64_t since = 0; since < maps_.size(); ++since) {
     SCOPED_TRACE("since " + std::to_string(since));
@@ -80,9 +80,9 @@ TEST_F(MapperChanges, LeadFromAnyMapToThisOne) {
     EXPECT_EQ(follower.sequence(), mapper_.sequence());
 
     for (const Surfel& surfel : changes.updated) ASSERT_NE(find(maps_.back(), surfel.id), nullptr) << surfel.id;
-    for (const std::uint32_t id : changes.removed) ASSERT_EQ(find(maps_.back(), id), nullptr) << id << " is not removed";
+    for (const std::uint32_t id : changes.removed) ASSERT_EQ(find(maps_.back(), id), nullptr) << id << " is still in the map";
     std::set<std::uint32_t> ids(changes.removed.begin(), changes.removed.end());
-    EXPECT_EQ(ids.size(), changes.removed.size()) << "told twice";
+    EXPECT_EQ(ids.size(), changes.removed.size()) << "an id is reported twice";
   }
 }
 
@@ -95,8 +95,8 @@ TEST_F(MapperChanges, NothingSinceNowOrLater) {
   }
 }
 
-/// One frame's changes name what it has changed, and no more.
-TEST(MapperChange, OfOneFrameIsSmall) {
+/// The changes of the last frame contain what it has changed, and no more.
+TEST(MapperChange, OfTheLastFrameIsExact) {
   Mapper mapper(undecimated());
   integrate_all(mapper, orbit_frames(coarse_camera(), 4, 5));
   const Map before = mapper.surfels();
@@ -122,7 +122,7 @@ TEST(MapperChange, OfOneFrameIsSmall) {
   EXPECT_EQ(changes.removed.size() + reused.size(), report.removed);
 }
 
-/// Surfels that splitting a surfel once makes of it: of half its radius, half the diagonal of r/(2 sqrt 2) away.
+/// Number of surfels made by splitting the parent once: with half its radius r, and r / 2 away from its centre.
 std::size_t quarters(const Surfel& parent, const Map& map) {
   return static_cast<std::size_t>(std::count_if(map.begin(), map.end(), [&](const Surfel& s) {
     return s.radius == parent.radius / 2 && s.label == parent.label && s.normal == parent.normal &&
@@ -130,7 +130,7 @@ std::size_t quarters(const Surfel& parent, const Map& map) {
   }));
 }
 
-/// The report's numbers add up when surfels are split into four.
+/// Splitting replaces a surfel by four, and the report's numbers add up.
 TEST(MapperChange, SplitSurfelsAreReplacedByFour) {
   Mapper mapper(undecimated());
   const Eigen::Vector3d forward(0, 1, 0);
@@ -148,7 +148,7 @@ TEST(MapperChange, SplitSurfelsAreReplacedByFour) {
     EXPECT_EQ(quarters(old, after), 4u);
   }
   EXPECT_GT(split, 100u);
-  EXPECT_EQ(report.split, 3 * split) << "each adds three";
+  EXPECT_EQ(report.split, 3 * split) << "each split adds three surfels";
   EXPECT_EQ(after.size(), before.size() + report.split + report.created - report.removed);
 }
 

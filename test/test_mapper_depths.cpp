@@ -1,4 +1,4 @@
-/// What the mapper makes of depths that are missing, out of range, infinite, or few.
+/// Depths that are missing, out of range, infinite, or few.
 #include <gtest/gtest.h>
 
 #include "mapper_input.hpp"
@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// The map of one image of one depth everywhere.
+/// The map of one image with the same depth everywhere.
 std::vector<Surfel> map_of_plane(double depth, const Config& config = undecimated()) {
   return map_of({plane_frame(coarse_camera(), depth)}, config);
 }
@@ -22,7 +22,7 @@ std::size_t occupied(const std::vector<Surfel>& surfels) {
 
 double voxel_at(double z) { return z / ((coarse_camera().fx + coarse_camera().fy) / 2); }
 
-/// How many of the image's pixels are without a surfel on their ray, at the depth of a plane before the camera at the origin.
+/// Number of pixels whose ray has no surfel at the depth of a plane in front of the camera, which stands at the origin.
 int pixels_without_surfel(const std::vector<Surfel>& surfels, double depth, Label label) {
   const Intrinsics camera = coarse_camera();
   cv::Mat met = cv::Mat::zeros(camera.height, camera.width, CV_8UC1);
@@ -42,7 +42,7 @@ TEST(MapperDepths, NothingMeasuredMakesNoSurfel) {
     EXPECT_EQ(report.surfels, 0u) << depth;
     EXPECT_EQ(report.created, 0u) << depth;
     EXPECT_TRUE(mapper.surfels().empty()) << depth;
-    EXPECT_EQ(mapper.sequence(), 1u) << "the frame was taken";
+    EXPECT_EQ(mapper.sequence(), 1u) << "the frame counts";
   }
 }
 
@@ -58,7 +58,7 @@ TEST(MapperDepths, NothingMeasuredChangesNothing) {
   }
 }
 
-/// NaN, negative and too near pixels among good ones are as good as 0.
+/// Pixels that are NaN, negative, infinite or out of range are handled like 0.
 TEST(MapperDepths, AllKindsOfMissingPixelsAreAlike) {
   const Frames frames = orbit_frames(coarse_camera(), 3, 5);
   std::vector<std::vector<Surfel>> maps;
@@ -74,7 +74,7 @@ TEST(MapperDepths, AllKindsOfMissingPixelsAreAlike) {
     EXPECT_TRUE(same(maps.front(), maps.back())) << missing;
   }
   EXPECT_GT(maps.front().size(), 10000u);
-  EXPECT_FALSE(same(maps.front(), map_of(frames, undecimated()))) << "the pixels would have counted";
+  EXPECT_FALSE(same(maps.front(), map_of(frames, undecimated()))) << "the missing pixels would have made a difference";
 }
 
 TEST(MapperDepths, PlanesAtTheEndsOfTheRange) {
@@ -85,9 +85,9 @@ TEST(MapperDepths, PlanesAtTheEndsOfTheRange) {
     for (const Surfel& s : surfels) {
       EXPECT_LT(s.position.z(), depth + 1.5 * voxel_at(depth)) << depth;
       if (s.label == Label::kFrontier) continue;
-      // Behind the plane at most a voxel, or on the voxel's near side.
+      // At most about a voxel before or behind the plane.
       EXPECT_NEAR(s.position.z(), depth, 1.5 * voxel_at(depth)) << depth;
-      EXPECT_LT(s.normal.z(), 0) << "turned away from the camera";
+      EXPECT_LT(s.normal.z(), 0) << "the normal points away from the camera";
       EXPECT_NEAR(s.radius, 0.8660254 * voxel_at(s.position.z()), 0.05 * voxel_at(depth)) << depth;
     }
     if (HasFailure()) return;
@@ -154,7 +154,7 @@ TEST(MapperDepths, ASinglePixel) {
   }
 }
 
-/// A decimation that does not divide the size leaves the last columns and rows away.
+/// If the decimation does not divide the image's size, the last columns and rows are not used.
 TEST(MapperDepths, DecimationThatDoesNotDivideTheSize) {
   const replay::Room room;
   Config config;

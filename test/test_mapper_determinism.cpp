@@ -1,4 +1,4 @@
-/// The same frames give the same map, to the last bit.
+/// The same frames give the same map, bit by bit.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -8,10 +8,10 @@
 namespace frontier_surfels {
 namespace {
 
-// PoCL then offers the processor twice, with and without threads. Before the first call into OpenCL, which reads it.
+// Makes PoCL offer the processor twice, with and without threads. Set before the first call into OpenCL, which reads it.
 const int kTwoDevices = setenv("POCL_DEVICES", "pthread basic", 0);
 
-/// All that the pipeline can do: colour, removals, reused ids, splits, another image size, a ring of views that overflows.
+/// Frames that make the pipeline do everything: colour, removals, reused ids, splits, another image size, more views than are kept.
 Frames varied_frames() {
   Frames frames = orbit_frames(coarse_camera(), 6, 5);
   const Intrinsics narrow = plain_camera(60, 44, 70);
@@ -51,7 +51,7 @@ struct Reference {
   }
 };
 
-TEST(MapperDeterminism, FramesDoAllThatThePipelineCan) {
+TEST(MapperDeterminism, TheFramesMakeThePipelineDoEverything) {
   const Reference& reference = Reference::instance();
   EXPECT_GT(reference.split, 0u);
   EXPECT_GT(reference.removed, 0u);
@@ -80,7 +80,7 @@ TEST(MapperDeterminism, ForAnyNumberOfThreads) {
   }
 }
 
-/// Work items that handle 16 points as vectors, and one each.
+/// The map is the same for work items that handle 16 points as vectors and for items that handle one.
 TEST(MapperDeterminism, AtEitherWidth) {
   const Reference& reference = Reference::instance();
   Config paper = load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/paper.yaml");
@@ -95,7 +95,7 @@ TEST(MapperDeterminism, AtEitherWidth) {
   }
 }
 
-TEST(MapperDeterminism, MappersDoNotMeddleWithEachOther) {
+TEST(MapperDeterminism, MappersDoNotAffectEachOther) {
   const Reference& reference = Reference::instance();
   Mapper one(few_views()), other(few_views());
   const Frames others = orbit_frames(coarse_camera(), 5, 9);
@@ -120,7 +120,7 @@ TEST(MapperDeterminism, AMovedMapperGoesOn) {
   EXPECT_TRUE(same(reference.surfels, third.surfels()));
 }
 
-TEST(MapperDeterminism, AfterAResetAsIfNew) {
+TEST(MapperDeterminism, AResetMapperIsLikeANewOne) {
   const Reference& reference = Reference::instance();
   Mapper mapper(few_views());
   integrate_all(mapper, orbit_frames(coarse_camera(), 3, 30));

@@ -1,4 +1,4 @@
-/// Maps that are saved, loaded and reset, and the numbers that are told of them.
+/// Saving, loading and resetting maps, and their statistics.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <unistd.h>
@@ -24,7 +24,7 @@ std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
   return surfels;
 }
 
-/// The same surfels, whatever their ids.
+/// Are the surfels the same except for their ids?
 testing::AssertionResult same_but_ids(std::vector<Surfel> a, std::vector<Surfel> b) {
   for (auto* surfels : {&a, &b}) {
     *surfels = sorted(*surfels);
@@ -55,7 +55,7 @@ class MapperFiles : public testing::Test {
 
   std::size_t files() const { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator()); }
 
-  /// A map that cannot be loaded leaves the mapper as it was: its map, its sequence number, and what it makes of the next frame.
+  /// Expects that a map cannot be loaded and that the mapper's map and sequence number stay.
   void expect_refused(const std::string& path) {
     const std::string said = fault_of<FileError>([&] { mapper_.load(path); });
     EXPECT_NE(said.find(path), std::string::npos) << "said '" << said << "'";
@@ -83,15 +83,15 @@ TEST_F(MapperFiles, ASavedMapComesBack) {
   EXPECT_EQ(other.sequence(), 1u);
 
   mapper_.load(path_);
-  EXPECT_TRUE(same(other.surfels(), mapper_.surfels())) << "over a map as into an empty one";
+  EXPECT_TRUE(same(other.surfels(), mapper_.surfels())) << "loading over a map gives the same as loading into an empty one";
 
   Mapper third(undecimated());
   other.save(path_);
   third.load(path_);
-  EXPECT_TRUE(same(other.surfels(), third.surfels())) << "ids as well, once they come from a file";
+  EXPECT_TRUE(same(other.surfels(), third.surfels())) << "a loaded map keeps its ids when it is saved and loaded again";
 }
 
-TEST_F(MapperFiles, SurfelsAreLoadedAsAFileIs) {
+TEST_F(MapperFiles, LoadingSurfelsIsLikeLoadingAFile) {
   mapper_.save(path_);
   Mapper from_file(undecimated());
   from_file.load(path_);
@@ -103,11 +103,11 @@ TEST_F(MapperFiles, SurfelsAreLoadedAsAFileIs) {
   EXPECT_TRUE(same(from_file.surfels(), mapper_.surfels()));
 }
 
-/// A loaded map is as good as the one that was saved: the next frames make the same of it.
+/// The next frames change a loaded map in the same way as the map that was saved.
 TEST_F(MapperFiles, MappingGoesOnWithALoadedMap) {
   Config config = undecimated();
-  config.recent_views = 0;        // these are not saved
-  config.refine_surfels = false;  // nor is what it knows of thin space
+  config.recent_views = 0;        // views are not saved
+  config.refine_surfels = false;  // nor are its marks of surfels in thin space
   Mapper through(config), resumed(config);
   Frames plain = orbit_frames(coarse_camera(), 6, 6);
   for (auto& frame : plain) frame.color.release();
@@ -129,7 +129,7 @@ TEST_F(MapperFiles, AnEmptyMapIsAMap) {
   EXPECT_TRUE(mapper_.surfels().empty());
   EXPECT_EQ(mapper_.statistics().surfels, 0u);
   integrate_all(mapper_, frames_);
-  EXPECT_TRUE(same(surfels_, mapper_.surfels())) << "as if new";
+  EXPECT_TRUE(same(surfels_, mapper_.surfels())) << "the mapper is like a new one";
 }
 
 TEST_F(MapperFiles, LoadingForgetsTheRecentViews) {
@@ -168,7 +168,7 @@ TEST_F(MapperFiles, AFileThatIsMissingOrDamagedIsRefused) {
   EXPECT_TRUE(same(untroubled.surfels(), mapper_.surfels()));
 }
 
-TEST_F(MapperFiles, SavingWhereItCannotBe) {
+TEST_F(MapperFiles, SavingToAnUnusablePathIsRefused) {
   for (const fs::path& path : {folder_ / "no_folder" / "map.ply", folder_, fs::path("/dev/full")}) {
     const std::string said = fault_of<FileError>([&] { mapper_.save(path.string()); });
     EXPECT_NE(said.find(path.string()), std::string::npos) << "said '" << said << "'";
@@ -181,19 +181,19 @@ TEST_F(MapperFiles, AFullDiskKeepsTheOldFile) {
   const fs::path disk = folder_ / "disk";
   fs::create_directory(disk);
   if (mount("none", disk.c_str(), "tmpfs", 0, "size=64k") != 0)
-    GTEST_SKIP() << "A small disk cannot be mounted here (" << std::strerror(errno) << "): run as root to test a full one.";
+    GTEST_SKIP() << "A small disk cannot be mounted here (" << std::strerror(errno) << "): run as root to test a full disk.";
   const std::string path = (disk / "map.ply").string();
   Mapper(undecimated()).save(path);
   const std::string old = bytes_of(path);
   const std::string said = fault_of<FileError>([&] { mapper_.save(path); });
   EXPECT_NE(said.find(path), std::string::npos) << "said '" << said << "'";
   EXPECT_EQ(bytes_of(path), old);
-  EXPECT_EQ(std::distance(fs::directory_iterator(disk), fs::directory_iterator()), 1) << "a temporary file is left";
+  EXPECT_EQ(std::distance(fs::directory_iterator(disk), fs::directory_iterator()), 1) << "a temporary file is left behind";
   umount(disk.c_str());
 }
 
 TEST_F(MapperFiles, AReadOnlyFolderKeepsTheOldFile) {
-  if (geteuid() == 0) GTEST_SKIP() << "Root may write into any folder: run as somebody else to test one that is read-only.";
+  if (geteuid() == 0) GTEST_SKIP() << "Root may write into any folder: run as another user to test a read-only folder.";
   Mapper(undecimated()).save(path_);
   const std::string old = bytes_of(path_);
   fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
@@ -224,7 +224,7 @@ TEST_F(MapperFiles, StatisticsFitTheMap) {
   EXPECT_GT(occupied, 1000u);
   EXPECT_LT(occupied, surfels_.size());
 
-  // A position, a radius, a normal and attributes are 16 bytes; what is spare is not many times as much.
+  // A surfel takes 16 bytes; spare capacity must not be many times as much.
   EXPECT_GE(statistics.map_bytes, 16 * surfels_.size());
   EXPECT_LT(statistics.map_bytes, 200 * surfels_.size());
   EXPECT_GT(statistics.device_bytes, statistics.map_bytes);
@@ -235,7 +235,7 @@ TEST_F(MapperFiles, StatisticsFitTheMap) {
   EXPECT_LT(empty.statistics().device_bytes, statistics.device_bytes);
 }
 
-TEST_F(MapperFiles, MemoryIsReleasedAndNotPiledUp) {
+TEST_F(MapperFiles, RepeatedResetsDoNotAddMemory) {
   std::size_t bytes[6];
   for (std::size_t& now : bytes) {
     mapper_.reset();

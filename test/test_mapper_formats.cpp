@@ -1,4 +1,4 @@
-/// The same image in another format makes the same map, to the last bit.
+/// The same image in another format makes the same map, bit by bit.
 #include <gtest/gtest.h>
 
 #include "mapper_input.hpp"
@@ -6,14 +6,14 @@
 namespace frontier_surfels {
 namespace {
 
-/// An image's rows, `bytes_a_pixel` each pixel, laid out anew: `padding` bytes of rubbish behind every row, `offset` ones before all of
-/// them.
+/// How an image lies in memory.
 struct Layout {
-  std::size_t padding = 0;
-  std::size_t offset = 0;
+  std::size_t padding = 0;  ///< bytes of rubbish behind every row
+  std::size_t offset = 0;   ///< bytes of rubbish before the first row
   bool swap_bytes = false;
 };
 
+/// The bytes of an image in a given layout.
 class Bytes {
  public:
   Bytes(const cv::Mat& image, const Layout& layout) : offset_(layout.offset), step_(image.cols * image.elemSize() + layout.padding) {
@@ -33,7 +33,7 @@ class Bytes {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Whole millimetres, as a sensor gives them, with dropouts.
+/// Frames with depths in whole millimetres, noise and lost pixels, as from a sensor.
 Frames sensor_frames() {
   const replay::Room room;
   replay::SensorModel sensor;
@@ -80,7 +80,7 @@ TEST(MapperFormats, DepthsOfAnyLayoutAreTheSame) {
   }
 }
 
-/// The map of frames whose colour is given as `channels` bytes a pixel in `order`.
+/// The map of frames whose colour images have `channels` bytes per pixel in the given order.
 std::vector<Surfel> map_of_colors(const Frames& frames, ColorImage::Order order, int channels, const Layout& layout) {
   Mapper mapper(undecimated());
   for (const auto& frame : frames) {
@@ -108,7 +108,7 @@ TEST(MapperFormats, ColoursOfAnyLayoutAreTheSame) {
         EXPECT_TRUE(same(expected, map_of_colors(frames, order, channels, layout))) << channels << " channels";
 }
 
-TEST(MapperFormats, ColourIsThatOfThePixelAndChangesNothingElse) {
+TEST(MapperFormats, SurfelsTakeTheirPixelsColourAndColourChangesNothingElse) {
   replay::RecordedFrame frame = plane_frame(coarse_camera(), 1.5);
   const auto plain = map_of({frame}, undecimated());
   frame.color = cv::Mat(60, 80, CV_8UC3, cv::Scalar(30, 20, 10));  // blue, green, red
@@ -132,8 +132,8 @@ TEST(MapperFormats, ColourIsThatOfThePixelAndChangesNothingElse) {
   EXPECT_TRUE(same(plain, colored));
 }
 
-/// Decimation takes every fourth pixel, and the intrinsics with it.
-TEST(MapperFormats, DecimatedIsTheSameAsRenderedSmall) {
+/// Decimation takes every fourth pixel and divides the intrinsics by four.
+TEST(MapperFormats, ADecimatedImageIsLikeASmallerOne) {
   const replay::Room room;
   Frames full, small;
   for (const int index : {0, 8}) {

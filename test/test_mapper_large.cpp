@@ -1,4 +1,4 @@
-/// Maps far from the world's origin, and large ones: what is mapped here does not depend on where here is, or what else is there.
+/// Maps far from the world's origin, and large maps: the map of a place depends neither on its coordinates nor on the rest of the map.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A camera that looks along an axis of the world, so that shifting it is exact.
+/// Pose of a camera that looks along an axis of the world, so that shifting the camera is exact.
 Eigen::Isometry3d look_along_axis(const Vector3d& eye, const Vector3d& axis) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear().col(0) = axis.cross(Vector3d::UnitZ());
@@ -23,7 +23,7 @@ Eigen::Isometry3d look_along_axis(const Vector3d& eye, const Vector3d& axis) {
   return pose;
 }
 
-/// Round about in the room, and up to one of its walls.
+/// Frames in all directions from the middle of the room, and towards its walls.
 Frames frames_along_axes() {
   const replay::Room room;
   Frames frames;
@@ -35,11 +35,11 @@ Frames frames_along_axes() {
 
 Config few_views() {
   Config config = undecimated();
-  config.recent_views = 4;  // so that the known space must be computed from the surfels as well
+  config.recent_views = 4;  // so that known space is computed from the surfels as well
   return config;
 }
 
-/// Far away floats are coarser than the map; near enough they show all of it.
+/// The map is the same wherever it lies. Returned positions are rounded to floats, which are coarse far from the origin.
 TEST(MapperLarge, TheSameMapFarAway) {
   Frames frames = frames_along_axes();
   const std::vector<Surfel> here = map_of(frames, few_views());
@@ -64,7 +64,7 @@ std::vector<Surfel> sorted_near(std::vector<Surfel> surfels) {
   return surfels;
 }
 
-/// Many blocks of one surfel each, and some of very many, all of them 100 m away.
+/// Surfels about 100 m away: many blocks with one surfel each, and a few blocks with very many.
 std::vector<Surfel> far_away() {
   cv::RNG random(1);
   std::vector<Surfel> surfels(60000);
@@ -91,7 +91,7 @@ TEST(MapperLarge, AMapElsewhereDoesNotMatter) {
     const Report a = alone.integrate(frames[n].view()), b = large.integrate(frames[n].view());
     EXPECT_TRUE(a.created == b.created && a.removed == b.removed && a.split == b.split && a.in_view == b.in_view);
     EXPECT_EQ(b.surfels, a.surfels + far);
-    EXPECT_LT(large.changes(large.sequence() - 1).updated.size(), near.size() + b.created) << "only what the frame has changed";
+    EXPECT_LT(large.changes(large.sequence() - 1).updated.size(), near.size() + b.created) << "more than the frame has changed";
   }
   const std::vector<Surfel> after = large.surfels();
   EXPECT_TRUE(same(sorted_near(alone.surfels()), sorted_near(after)));
@@ -101,7 +101,7 @@ TEST(MapperLarge, AMapElsewhereDoesNotMatter) {
   std::copy_if(after.begin(), after.end(), std::back_inserter(far_after), is_far);
   EXPECT_TRUE(same(far_before, far_after));
 
-  // A late subscriber is told all of it, another one only what is new.
+  // A late subscriber gets the whole map, another one only the changes.
   Follower late, other;
   late.apply(large.changes(0));
   EXPECT_TRUE(same(after, late.surfels()));
@@ -114,7 +114,7 @@ TEST(MapperLarge, AMapElsewhereDoesNotMatter) {
   EXPECT_LT(changes.updated.size(), after.size() - far + 1);
 }
 
-/// Nobody's radii, but a file may hold them: mapping goes on.
+/// A mapper does not make such radii, but a file may contain them: mapping goes on.
 TEST(MapperLarge, SurfelsLargerThanTheRoom) {
   const Frames frames = orbit_frames(coarse_camera(), 4, 5);
   for (const float radius : {0.5F, 3.0F, 1e4F, 1e30F}) {

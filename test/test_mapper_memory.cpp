@@ -1,4 +1,4 @@
-/// A device that is too small: a DeviceError says so, and smaller frames go on.
+/// Frames that are too large for the device give a DeviceError, and smaller frames still work.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -8,12 +8,12 @@
 namespace frontier_surfels {
 namespace {
 
-// PoCL then offers one GiB. Before the first call into OpenCL, which reads it. Other devices may be too large for these tests.
+// Makes PoCL offer one GiB. Set before the first call into OpenCL, which reads it. Other devices may be too large for these tests.
 const int kSmallDevice = setenv("POCL_MEMORY_LIMIT", "1", 1);
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-/// Integrates a frame that the device has no room for.
+/// Message of the error when a frame is integrated that is too large for the device; "" without an error.
 std::string refusal(Mapper& mapper, const DepthFrame& frame) {
   return fault_of<DeviceError>([&] { mapper.integrate(frame); });
 }
@@ -25,7 +25,7 @@ void expect_goes_on(Mapper& mapper, const std::vector<Surfel>& before, const Fra
   EXPECT_GT(mapper.surfels().size(), before.size());
 }
 
-/// One buffer is larger than the device allows: a grid of 1.6e9 voxels.
+/// A grid of 1.6e9 voxels: one buffer is larger than the device allows.
 TEST(MapperMemory, AGridTooLargeForTheDevice) {
   const Frames frames = orbit_frames(coarse_camera(), 12, 3);
   Mapper mapper(undecimated());
@@ -39,7 +39,7 @@ TEST(MapperMemory, AGridTooLargeForTheDevice) {
   expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
 }
 
-/// The pool of recent views is larger than the device allows, the grid is not.
+/// The images of the recent views take more memory than the device allows; the grid does not.
 TEST(MapperMemory, RecentViewsTooManyForTheDevice) {
   const Frames frames = orbit_frames(coarse_camera(), 12, 3);
   Config config = undecimated();

@@ -1,4 +1,4 @@
-/// The map of a room whose every surface is known, against what the frames have seen and against the room itself.
+/// The map of a room with known surfaces, compared with what the frames have seen and with the room itself.
 #include <gtest/gtest.h>
 
 #include "mapper_input.hpp"
@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 
 constexpr double kVoxelsOfRadius = 2 / 1.7320508;  // a new surfel's radius is sqrt(3)/2 voxels
 
-/// A walk and its map, made once for all tests.
+/// A walk around the room and its map, made once for all tests.
 struct Walk {
   Config config = undecimated();
   replay::Room room;
@@ -22,7 +22,7 @@ struct Walk {
     return walk;
   }
 
-  /// Whether a frame's ray passes p, by the geometry of the room: no pixels, no rounding.
+  /// Does a ray of a frame pass through p? Decided by the room's geometry, without pixels and rounding.
   bool seen(const Vector3d& p_world) const {
     return std::any_of(frames.begin(), frames.end(), [&](const replay::RecordedFrame& frame) {
       const Intrinsics& camera = frame.intrinsics;
@@ -36,7 +36,7 @@ struct Walk {
   }
 };
 
-/// Share of the surfels, every `stride`-th, of which `holds` says true.
+/// Share of every `stride`-th surfel for which `holds` is true.
 template <typename Predicate>
 double share(const std::vector<Surfel>& surfels, std::size_t stride, Predicate&& holds) {
   std::size_t count = 0, held = 0;
@@ -80,7 +80,7 @@ TEST(MapperRoom, OccupiedSurfelsLieOnTheRoomsSurfaces) {
                     return walk.room.distance(p + 2 * voxel * normal) < walk.room.distance(p);
                   }),
             0.003)
-      << "their normals point into free space";
+      << "normals point into solids";
 }
 
 TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
@@ -88,7 +88,7 @@ TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
   EXPECT_LE(share(walk.surfels, 1, [&](const Vector3d& p, const Vector3d&, double voxel) { return walk.room.distance(p) < -2 * voxel; }),
             0.0005);
 
-  /// Of the points `voxels` voxels from a surfel along the axes, and in front of it: how many are seen.
+  /// Number of seen points among seven: six at `distance` from a surfel along the axes, and one in front of it.
   const auto seen_around = [&](const Vector3d& p, const Vector3d& normal, double distance) {
     int count = walk.seen(p + distance * normal);
     for (int axis = 0; axis < 3; ++axis)
@@ -97,12 +97,12 @@ TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
   };
   EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, voxel) == 7; }),
             0.01)
-      << "all around is known";
+      << "all space around a surfel is known";
   EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, 2 * voxel) == 0; }),
             0.012)
-      << "nothing around is known";
+      << "no space around a surfel is known";
   EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return walk.seen(p - voxel * n); }), 0.04)
-      << "known space is behind";
+      << "the space behind a surfel is known";
 }
 
 TEST(MapperRoom, EverySurfaceThatWasSeenHasItsSurfels) {
@@ -124,7 +124,7 @@ TEST(MapperRoom, EverySurfaceThatWasSeenHasItsSurfels) {
     bare += (nearest->position.cast<double>() - q).norm() > 1.5 * depth / camera.fx;
     not_occupied += nearest->label != Label::kOccupied;
   }
-  EXPECT_LE(bare, 10) << "of 500, where pixels are far apart on slanting surfaces";
+  EXPECT_LE(bare, 10) << "of 500 points; pixels are far apart on slanting surfaces";
   EXPECT_LE(not_occupied, 30);
 }
 

@@ -1,4 +1,4 @@
-/// The OctoMap truth against a map that is counted voxel by voxel, as OctoMap's log odds are defined.
+/// The OctoMap truth compared with a map that accumulates OctoMap's log odds voxel by voxel, without a tree.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ Voxel voxel_of(const Surfel& surfel) {
   return v;
 }
 
-/// Occupancy as OctoMap accumulates it, without a tree: log odds of hits and misses, clamped.
+/// Occupancy as in OctoMap, without a tree: clamped sums of the log odds of hits and misses.
 class SlowMap {
  public:
   void hit(const Voxel& v) { add(v, std::log(0.7 / 0.3)); }
@@ -34,7 +34,7 @@ class SlowMap {
   bool occupied(const Voxel& v) const { return known(v) && log_odds_.at(v) >= 0; }
   std::size_t size() const { return log_odds_.size(); }
 
-  /// Equations 17 and 18, for every voxel of a box.
+  /// Equations 17 and 18 for every voxel of a box.
   std::map<Voxel, Surfel> boundary(int low, int high) const {
     std::map<Voxel, Surfel> result;
     for (int x = low; x <= high; ++x) {
@@ -71,7 +71,8 @@ class SlowMap {
   std::map<Voxel, double> log_odds_;
 };
 
-/// A camera of one pixel in the middle of voxel `from` that looks along an axis and measures a surface `steps` voxels away.
+/// Adds a view to both maps: a camera of one pixel in the centre of voxel `from` looks along an axis and measures a surface `steps` voxels
+/// away.
 void look(OctomapTruth& truth, SlowMap& slow, const Voxel& from, int axis, int steps) {
   const float depth = static_cast<float>(std::abs(steps) * kResolution);
   DepthFrame frame;
@@ -110,7 +111,7 @@ TEST(OctomapTruth, BoundaryOfOneRay) {
   EXPECT_TRUE(truth.boundary().empty());
   SlowMap slow;
   look(truth, slow, {0, 0, 0}, 2, 4);
-  // Five known voxels in a row: four neighbours around each and one at either end; the last voxel is occupied.
+  // Five known voxels in a row: each has four neighbours beside the row, and each end has one more. The last voxel is occupied.
   const std::vector<Surfel> boundary = truth.boundary();
   ASSERT_EQ(boundary.size(), 5 * 4 + 2u);
   EXPECT_EQ(std::count_if(boundary.begin(), boundary.end(), [](const Surfel& s) { return s.label == Label::kOccupied; }), 5);
@@ -134,21 +135,21 @@ TEST(OctomapTruth, BoundaryOfPrunedTree) {
   OctomapTruth truth(kResolution, 0.05, 3, 1);
   SlowMap slow;
   const double empty_mb = truth.memory_mb();
-  // Seen so often that the free voxels share the least log odds, and OctoMap makes large leaves of them.
+  // After so many views all free voxels have the lowest log odds, and OctoMap merges them into large leaves.
   for (int again = 0; again < 6; ++again) {
     for (int x = 0; x < 13; ++x) {
       for (int y = 0; y < 12; ++y) look(truth, slow, {x, y, -3}, 2, x == 4 ? 17 : 20);
     }
   }
   EXPECT_GT(slow.size(), 2800u);
-  // A node takes 16 bytes: one for each voxel would be more memory than this.
+  // A node takes 16 bytes. With a node for each voxel the tree would take more memory than this.
   EXPECT_LT(truth.memory_mb() - empty_mb, 16e-6 * slow.size());
   EXPECT_GT(truth.memory_mb(), empty_mb);
   expect_same_boundary(truth, slow.boundary(-10, 25));
 }
 
 TEST(OctomapTruth, ReadsWhatTheMapperReads) {
-  // Decimated by 2: of the 2 x 2 pixels that remain, one is too near, one NaN and one too far.
+  // After decimation by 2 the remaining pixels are: too near, NaN, 0.85 m, too far.
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   std::vector<float> depth(5 * 4, 1.f);
   depth[0] = 0.4f;
@@ -191,12 +192,12 @@ std::vector<Surfel> at_x(const std::vector<double>& xs) {
   return surfels;
 }
 
-TEST(OctomapTruth, ScoreCountsWhatIsFarFromTheOther) {
+TEST(OctomapTruth, ScoreCountsSurfelsFarFromTheOtherMap) {
   const OctomapTruth truth(kResolution, 0.5, 3, 1);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const OctomapScore score = truth.score(at_x({0, 0.04, 0.06, 1.049, nan}), at_x({0, 1, 2, 3}));
   EXPECT_EQ(score.surfels, 4u);
-  EXPECT_EQ(score.fp, 2u);  // 0.06 and the one that is nowhere
+  EXPECT_EQ(score.fp, 2u);  // 0.06 and NaN
   EXPECT_EQ(score.fn, 2u);  // 2 and 3
   EXPECT_DOUBLE_EQ(score.fdr, 2 / 5.0);
   EXPECT_DOUBLE_EQ(score.for_, 2 / 4.0);

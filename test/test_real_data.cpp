@@ -1,4 +1,4 @@
-/// The map of recorded sequences, measured by the exact test. Skipped where the recordings are not.
+/// Maps of recorded sequences, measured by the exact test. Skipped without recordings.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -26,7 +26,7 @@ std::vector<fs::path> sequences() {
 }
 
 std::string why_skipped() {
-  return "There is no recorded sequence in " + data_folder().string() + ": set FRONTIER_SURFELS_DATA to a folder of them.";
+  return "There is no recorded sequence in " + data_folder().string() + ": set FRONTIER_SURFELS_DATA to a folder with sequences.";
 }
 
 Frames first_frames(const fs::path& folder, int count) {

@@ -1,4 +1,4 @@
-/// kernels/stages/2_candidates.cl, exactly, against eq. (13) one voxel at a time.
+/// kernels/stages/2_candidates.cl compared exactly with eq. (13), evaluated one voxel at a time.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ void check(const CameraSetup& camera, double observed_density) {
   Candidates found(fixture.commands());
   found.find(fixture.frame(), observed_bits, counters);
   expect_equal("candidates", candidates(observed), fixture.read(found));
-  EXPECT_EQ(counters.read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the counters of the next stage";
+  EXPECT_EQ(counters.read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the next stage's counters are not cleared";
 }
 
 TEST(StageCandidates, RandomFields) {

@@ -1,4 +1,4 @@
-/// The kernels of creation: the filter of new surfels, and where and how they are made.
+/// The kernels of creation: the filter of new surfels, and their positions and normals.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 using namespace reference;
 
-/// What creation needs of other stages, as data, and the stage itself.
+/// The stage of creation, and the results of other stages that it needs.
 struct CreationFixture : FrameFixture {
   explicit CreationFixture(const Config& config)
       : FrameFixture(config),
@@ -28,7 +28,7 @@ struct CreationFixture : FrameFixture {
         settling(commands()),
         creation(commands(), lists()) {}
 
-  /// Lists the candidates and filters them. @param with_known  looks at K~
+  /// Lists the candidates and filters them. @param with_known  whether the filter uses K~
   void filter(bool with_known = true) {
     list.list(frame(), camera(), observed, candidates);
     creation.filter(frame(), list, candidates, with_known ? &known : nullptr);
@@ -54,7 +54,7 @@ struct CreationFixture : FrameFixture {
   Creation creation;
 };
 
-/// @param all_views  no view has been forgotten: K~ has not been computed, and is not looked at
+/// @param all_views  as if no view was forgotten: K~ is not computed, and the filter does not use it
 void check_filter(const CameraSetup& camera, double observed_density, double known_density, bool all_views = false) {
   SCOPED_TRACE(camera.name + ", density " + std::to_string(observed_density));
   Random random(1);
@@ -95,7 +95,7 @@ TEST(StageCreation, FilterWhileNoViewIsForgotten) {
   for (const CameraSetup& camera : cameras()) check_filter(camera, 0.3, 0.5, true);
 }
 
-/// Two observed voxels on opposite sides cancel; a third one decides.
+/// The directions to two observed voxels on opposite sides cancel; a third voxel gives the normal.
 TEST(StageCreation, OppositeDirectionsMakeNoSurfel) {
   const CameraSetup camera = cameras().front();
   Random random(1);
@@ -119,15 +119,15 @@ struct Scene {
   std::vector<SeenView> kept;
   SeenView current;
   Field<char> observed;
-  std::vector<Vector3i> voxels;  ///< of the candidates, in the order of their numbers
+  std::vector<Vector3i> voxels;  ///< voxels of the candidates, in the order of their numbers
 };
 
-/// Distance of the point before a new surfel where known space is expected: 7/4 r.
+/// Distance from a new surfel to the point in front of it that should be known: 7/4 r [m].
 double front_distance(const Scene& scene, const Vector3d& center) { return 1.75 * std::sqrt(3.0) / 2 * scene.grid.voxel_size(center.z()); }
 
 Truth current_view_knows(const Scene& scene, const Vector3d& p_camera) { return camera_knows(scene.current, p_camera); }
 
-/// What a predicate says of a point that may lie so far from where it is said to [m].
+/// Predicate for a point that is known up to an error of `off` [m] along each axis; open if the predicate differs nearby.
 template <typename Predicate>
 Truth about(const Vector3d& p, double off, Predicate&& predicate) {
   const Truth here = predicate(p);
@@ -136,22 +136,22 @@ Truth about(const Vector3d& p, double off, Predicate&& predicate) {
   return here;
 }
 
-/// Does this view know the space before a new surfel with such a normal?
+/// Does the current view know the point in front of a new surfel with this normal?
 Truth has_known_front(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
   const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z());
   return current_view_knows(scene, center + front_distance(scene, center) * normal);
 }
 
-/// May this be the normal? It is the mean direction; where this view does not know the space before it, the direction nearest to the mean
-/// of those to single observed voxels that have it.
+/// Is this a valid normal? It should be the mean direction. If the current view does not know the point in front for that, it should be the
+/// direction to a single observed voxel for which the point is known, the nearest such direction to the mean.
 bool is_normal(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
   constexpr double kTolerance = 1e-3;
   const std::vector<Vector3d> all = directions(scene.grid, scene.observed, v);
   const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v).normalized();
   const auto has_front = [&](const Vector3d& n) { return has_known_front(scene, v, n); };
-  double certain = -2;  // cosine between the mean and the nearest direction that certainly has known space before it
+  double certain = -2;  // cosine between the mean and the nearest direction that certainly has a known point in front
   for (const Vector3d& direction : all)
-    if (has_front(direction) == Truth::yes && direction.dot(mean) > -1 + 1e-5)  // the opposite is no choice
+    if (has_front(direction) == Truth::yes && direction.dot(mean) > -1 + 1e-5)  // the opposite of the mean is never chosen
       certain = std::max(certain, direction.dot(mean));
   if ((normal - mean).norm() < kTolerance && (has_front(mean) != Truth::no || certain < -1)) return true;
   if (has_front(mean) == Truth::yes) return false;
@@ -161,8 +161,8 @@ bool is_normal(const Scene& scene, const Vector3i& v, const Vector3d& normal) {
   return false;
 }
 
-/// Where a new surfel may stand: in its voxel, moved towards what is known or not at all, and not known itself.
-/// @return how far it was moved [voxel]
+/// Expects that a new surfel stands in its voxel, was moved only towards known space, and does not stand in known space.
+/// @return distance by which it was moved [voxel]
 double check_place(const Scene& scene, const Vector3i& v, const Vector3d& normal, const Vector3d& p) {
   const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z()), moved = p - center;
   const Voxel voxel = voxel_of(scene.grid.to_grid(p), 1e-3);
@@ -179,10 +179,10 @@ double check_place(const Scene& scene, const Vector3i& v, const Vector3d& normal
     EXPECT_TRUE(about(p, step, known) != Truth::yes) << "moved into known space";
   }
   const Vector3d front = front_distance(scene, center) * normal;
-  const double off = step + 1e-4 * front.norm();  // of the normal
+  const double off = step + 1e-4 * front.norm();  // error of the position, and of the normal
   const auto seen = [&](const Vector3d& q) { return current_view_knows(scene, q); };
   if (about(center + front, off, seen) == Truth::yes) {
-    EXPECT_TRUE(about(p + front, off, seen) != Truth::no) << "lost the known space before it";
+    EXPECT_TRUE(about(p + front, off, seen) != Truth::no) << "the point in front is no longer known";
   }
   return moved.norm() / size;
 }
@@ -220,7 +220,28 @@ Scene prepare(const CameraSetup& camera, CreationFixture& fixture, double densit
   return scene;
 }
 
-/// @return how many of the new surfels were moved
+/// Expects a valid new surfel in voxel v. @return distance by which it was moved from the voxel's centre [voxel]
+double check_new_surfel(const Scene& scene, const Vector3i& v, const Surfel& surfel, std::uint32_t attributes) {
+  const bool refine = scene.camera.config.refine_surfels;
+  const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
+  const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
+  const Vector3d mean = sum_of_directions(scene.grid, scene.observed, v).normalized();
+  const Truth ragged = refine ? !has_known_front(scene, v, mean) : Truth::no;
+  if (refine)
+    EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();
+  else
+    EXPECT_LT((normal - mean).norm(), 1e-4) << "normal " << normal.transpose();
+  if (ragged != Truth::open) {
+    EXPECT_EQ(attributes, ragged == Truth::yes ? SURFEL_RAGGED : 0);
+  }
+  const double size = scene.grid.voxel_size(scene.grid.center_of(v.x(), v.y(), v.z()).z());
+  EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, size / 2048) << "more than the rounding to 16 bits";
+  EXPECT_EQ(surfel.label, Label::kFrontier);
+  EXPECT_TRUE((surfel.rgb == std::array<std::uint8_t, 3>{0, 0, 0}));
+  return check_place(scene, v, normal, p);
+}
+
+/// @return number of new surfels that were moved
 std::size_t check_creation(CameraSetup camera, int old_surfels, double density, bool refine = true) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(old_surfels) + " old surfels, density " + std::to_string(density));
   camera.config.refine_surfels = refine;
@@ -252,23 +273,7 @@ std::size_t check_creation(CameraSetup camera, int old_surfels, double density, 
   for (std::size_t n = 0; n < scene.voxels.size(); ++n) {
     const Vector3i v = scene.voxels[n];
     SCOPED_TRACE(voxel_text(v.x(), v.y(), v.z()));
-    const Surfel& surfel = by_slot.at(slots[n]);
-    const Eigen::Isometry3d T_camera_world = scene.current.T_world_camera.inverse();
-    const Vector3d normal = T_camera_world.linear() * surfel.normal.cast<double>(), p = T_camera_world * surfel.position.cast<double>();
-    const Vector3d mean = sum_of_directions(grid, scene.observed, v).normalized();
-    const Truth ragged = refine ? !has_known_front(scene, v, mean) : Truth::no;
-    if (refine)
-      EXPECT_TRUE(is_normal(scene, v, normal)) << "normal " << normal.transpose();
-    else
-      EXPECT_LT((normal - mean).norm(), 1e-4) << "normal " << normal.transpose();
-    if (ragged != Truth::open) {
-      EXPECT_EQ(fixture.access().attributes(slots[n]), ragged == Truth::yes ? SURFEL_RAGGED : 0);
-    }
-    const double size = grid.voxel_size(grid.center_of(v.x(), v.y(), v.z()).z());
-    EXPECT_NEAR(surfel.radius, std::sqrt(3.0) / 2 * size, size / 2048) << "16 bits";
-    EXPECT_EQ(surfel.label, Label::kFrontier);
-    EXPECT_TRUE((surfel.rgb == std::array<std::uint8_t, 3>{0, 0, 0}));
-    moved += check_place(scene, v, normal, p) > 1e-3;
+    moved += check_new_surfel(scene, v, by_slot.at(slots[n]), fixture.access().attributes(slots[n])) > 1e-3;
   }
   return moved;
 }
@@ -280,7 +285,7 @@ TEST(StageCreation, RandomCandidates) {
   EXPECT_GT(moved, 0u);
 }
 
-TEST(StageCreation, AtVoxelCentersIfSoConfigured) {
+TEST(StageCreation, AtVoxelCentersWithoutRefinement) {
   for (const CameraSetup& camera : cameras()) EXPECT_EQ(check_creation(camera, 0, 0.01, false), 0u);
 }
 

@@ -1,5 +1,5 @@
-/// kernels/common/grid.cl and the numbers of lanes.cl: F, F^-1, rounding, and the layout of bit fields, against double precision and loops
-/// over bits.
+/// kernels/common/grid.cl and the numbers of lanes.cl: F, F^-1, rounding, and the layout of bit fields, compared with double precision and
+/// loops over bits.
 
 #include <gtest/gtest.h>
 
@@ -90,7 +90,7 @@ TestKernels& kernels() {
 cl_float4 pack4(const Vector3d& v) { return {{static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()), 0}}; }
 Vector3d unpack4(const cl_float4& v) { return {v.s[0], v.s[1], v.s[2]}; }
 
-/// fx and fy differ in most of them.
+/// Cameras, most of which have different fx and fy.
 std::vector<CameraSetup> grids() {
   std::vector<CameraSetup> all = cameras();
   all.push_back(make_camera(160, 120, 131.25, 131.25, 369));
@@ -98,7 +98,7 @@ std::vector<CameraSetup> grids() {
   return all;
 }
 
-/// @param around  how far beyond the grid they may be [voxel]
+/// @param around  largest distance of the points from the grid [voxel]
 std::vector<cl_float4> random_points(const Nuvg& grid, int count, double around, Random& random) {
   std::vector<cl_float4> points;
   for (int n = 0; n < count; ++n) {
@@ -131,7 +131,7 @@ std::vector<cl_int4> all_voxels(const Grid& grid) {
   return voxels;
 }
 
-/// F^-1 of the centres of voxels, which F and rounding bring back to their voxels.
+/// F^-1 of voxel centres. F and rounding must lead back to the same voxels.
 TEST(StageGrid, InverseOfF) {
   for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
@@ -164,7 +164,8 @@ TEST(StageGrid, ContinuousAtZMin) {
   }
 }
 
-/// Points in the grid and around it, in the cuboid, behind the camera, far away, at borders between voxels, and at z_min to the last bit.
+/// Points in the grid and around it, in the cuboid, behind the camera, far away, at borders between voxels, and at z_min and its
+/// neighbouring floats.
 std::vector<cl_float4> awkward_points(const Nuvg& grid, Random& random) {
   std::vector<cl_float4> all = random_points(grid, 800, 5, random);
   const auto z_min = static_cast<float>(grid.z_min);
@@ -194,7 +195,7 @@ TEST(StageGrid, VoxelsOfPoints) {
       if (expected.open) continue;
       comparison.add(truth(grid.contains(expected.index)), v[n].s[3] != 0, [&] { return "a point"; });
       if (v[n].s[3] == 0) continue;
-      EXPECT_EQ(v[n].s[3], -1) << "a mark";
+      EXPECT_EQ(v[n].s[3], -1) << "a mark is -1";
       ++inside;
       cuboid += p[n].s[2] < grid.z_min;
       EXPECT_EQ(Vector3i(v[n].s[0], v[n].s[1], v[n].s[2]), expected.index) << unpack4(p[n]).transpose();
@@ -299,7 +300,7 @@ TEST(StageGrid, LowestAndHighestBit) {
     }
 }
 
-/// Where voxels' bits are in bit fields, by rows and by tiles, and the voxels of listed candidates.
+/// Positions of voxels in bit fields, by rows and by tiles, and voxels of listed candidates.
 TEST(StageGrid, LayoutOfBitFields) {
   for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
@@ -320,7 +321,7 @@ TEST(StageGrid, LayoutOfBitFields) {
       ASSERT_EQ(places[n].s[0], 2 * row + half);
       ASSERT_EQ(places[n].s[1], 2 * tile_word + half);
       ASSERT_EQ(static_cast<cl_uint>(places[n].s[2]), 1U << k % 32);
-      ASSERT_EQ(places[n].s[3], -1) << "a listed candidate's voxel";
+      ASSERT_EQ(places[n].s[3], -1) << "voxel of a listed candidate";
     }
 
     std::vector<cl_int> all_words(g.words_k);

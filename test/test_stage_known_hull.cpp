@@ -1,4 +1,4 @@
-/// kernels/stages/10_known_hull.cl against the projection of every surfel onto every cell of every face.
+/// kernels/stages/10_known_hull.cl compared with the projection of every surfel onto every cell of every face.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 using namespace reference;
 
-/// @param candidate_density  only the paths around so many voxels are needed; 1: all
+/// @param candidate_density  share of candidate voxels; only the paths around these are needed
 /// @return share of known cells
 double check(const CameraSetup& camera, const Eigen::Isometry3d& T_world_camera, const std::vector<Surfel>& surfels,
              double candidate_density = 1) {
@@ -66,7 +66,7 @@ TEST(StageKnownHull, RandomSurfels) {
   EXPECT_GT(known, 0.005) << "nothing was tested";
 }
 
-/// Walls of surfels that look at the grid from all around: most of its faces are known.
+/// Surfels all around the grid face its middle, so that most of its faces are known.
 TEST(StageKnownHull, SurroundedByKnownSpace) {
   const CameraSetup camera = cameras().front();
   Random random(7);
@@ -82,7 +82,7 @@ TEST(StageKnownHull, SurroundedByKnownSpace) {
   EXPECT_GT(check(camera, T_world_camera, surfels, 0.005), 0.3);
 }
 
-/// The same surfels twice, once turned round: unknown wins each tie, so nothing is known.
+/// Every surfel has a twin that faces the other way. Unknown wins each tie, so nothing is known.
 TEST(StageKnownHull, UnknownWinsTies) {
   const CameraSetup camera = cameras().front();
   Random random(4);

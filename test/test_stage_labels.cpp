@@ -1,4 +1,4 @@
-/// The kernels of labels and colours against the columns of section 5, one surfel at a time.
+/// The kernels of labels and colours compared with the columns of observed space, one surfel at a time.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ struct Scene {
   Eigen::Isometry3d T_world_camera;
 };
 
-/// Surfels around the ends of the columns, and some anywhere.
+/// Surfels, most of them near the ends of columns.
 std::vector<Surfel> surfels_near_surfaces(const Scene& scene, int count, Random& random) {
   std::vector<Surfel> surfels = random_surfels(scene.grid, scene.T_world_camera, count, 2, 2, random);
   for (Surfel& surfel : surfels) {
@@ -37,7 +37,7 @@ std::vector<Surfel> surfels_near_surfaces(const Scene& scene, int count, Random&
   return surfels;
 }
 
-/// @param pixel  of the column that the surfel lies in
+/// @param pixel  out: index of the pixel whose column contains the surfel
 Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, const Surfel& surfel, int* pixel) {
   const Vector3d p = scene.T_world_camera.inverse() * surfel.position.cast<double>();
   const Voxel voxel = voxel_of(scene.grid.to_grid(p), 1e-3);
@@ -47,8 +47,9 @@ Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, c
   return at_surface(scene.grid, scene.image, layer_depth, scene.camera.config.surface_depth, voxel.index, p.z());
 }
 
-/// @param removed  of the surfels before;  are_new: all count as changed, whatever the labels do
-/// @return how many surfels lie at surfaces
+/// @param removed  number of surfels of `before` that were removed
+/// @param are_new  all surfels count as changed, whether they get a label or not
+/// @return number of surfels at surfaces
 std::size_t compare(const Scene& scene, VisitFixture& fixture, const std::vector<Surfel>& before, std::size_t removed, bool are_new) {
   std::map<std::uint32_t, Surfel> after, changed;
   for (const Surfel& surfel : fixture.map().download()) after[surfel.id] = surfel;
@@ -56,7 +57,7 @@ std::size_t compare(const Scene& scene, VisitFixture& fixture, const std::vector
   for (const Surfel& surfel : fixture.map().last_changes().updated) changed[surfel.id] = surfel;
   EXPECT_EQ(after.size() + removed, before.size());
   const std::vector<float> layer_depth = fixture.layer_depth();
-  Comparison occupied("occupied"), colored("colour taken"), told("change told");
+  Comparison occupied("occupied"), colored("colour taken"), told("change reported");
   std::size_t at_surfaces = 0;
   for (const Surfel& surfel : before) {
     if (after.count(surfel.id) == 0) continue;  // in observed space
@@ -97,7 +98,7 @@ std::size_t check(CameraSetup camera, Content content, int count, bool with_colo
   if (are_new) {
     fixture.access().change_all();
   } else {
-    removed = fixture.look().removed;  // also says which of those that stay are to be labelled
+    removed = fixture.look().removed;  // also marks the remaining surfels that get a label
     remove_surfels(fixture.commands(), fixture.visit.removed(), removed, fixture.map());
   }
   label_surfels(fixture.commands(), fixture.frame(), fixture.camera(), fixture.space.column_end(), fixture.map());

@@ -1,4 +1,4 @@
-/// kernels/common/lists.cl: prefix sums and lists of set bits, exactly.
+/// kernels/common/lists.cl: prefix sums and lists of set bits, compared exactly.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using reference::Random;
 
-/// Around a word, a chunk, what one work item scans alone (2048; on a CPU 65536), and a second and a third level of sums.
+/// Sizes around a word, a chunk, the number that one work item scans alone (2048; 65536 on PoCL), and a second and third level of sums.
 std::vector<std::size_t> sizes() {
   std::vector<std::size_t> sizes = {0, 1, 15, 16, 17, 63, 64, 65, 2047, 2048, 2049};
   if (reference::small_tests()) return sizes;
@@ -20,7 +20,7 @@ std::vector<std::size_t> sizes() {
 }
 
 struct TestLists {
-  /// @return prefix sums, the total behind them
+  /// @return prefix sums, followed by the total
   std::vector<std::uint32_t> scan(const std::vector<std::uint32_t>& values, std::uint32_t* total) {
     DeviceArray<cl_uint> array(test_commands());
     array.resize(values.size() + 1);
@@ -79,7 +79,7 @@ TEST(StageLists, SetBitsInOrder) {
   }
 }
 
-/// So many words that a CPU, too, counts before it lists.
+/// Enough words that the bits are counted before they are listed, on PoCL as well.
 TEST(StageLists, SetBitsOfManyWords) {
   Random random(3);
   TestLists lists;

@@ -1,4 +1,4 @@
-/// The map's pages: where new surfels go, what becomes of empty pages, and what is told of changes; against a slow book of all slots.
+/// The map's pages: slots of new surfels, reuse of empty pages, and reported changes, compared with a simple book of all slots.
 
 #include <gtest/gtest.h>
 
@@ -19,12 +19,12 @@ using Packed = std::array<std::uint32_t, 4>;
 
 Packed to_array(const cl_uint4& packed) { return {packed.s[0], packed.s[1], packed.s[2], packed.s[3]}; }
 
-/// What should be in the map: every surfel's slot and packed form, and every page's block.
+/// Expected content of the map: every surfel's slot and packed form, and every page's block.
 struct Book {
   std::map<std::uint32_t, Packed> surfels;
   std::map<std::uint32_t, BlockKey> pages;
 
-  /// Lowest free slots of a page.
+  /// Free slots of a page, lowest first.
   std::vector<std::uint32_t> free_slots(std::uint32_t page) const {
     std::vector<std::uint32_t> free;
     for (std::uint32_t slot = PAGE_SLOTS * page; slot < PAGE_SLOTS * (page + 1); ++slot)
@@ -33,7 +33,7 @@ struct Book {
   }
 };
 
-/// A map, and the window of a view of it.
+/// A map with the window of a view, and the book of its expected content.
 class Pages {
  public:
   explicit Pages(unsigned seed, Commands& commands = test_commands()) : random_(seed), fixture_(camera_.config, commands) {}
@@ -42,14 +42,14 @@ class Pages {
   SurfelMap& map() { return fixture_.map(); }
   const Book& book() const { return book_; }
 
-  /// Fills the map anew with surfels in and around the next window.
+  /// Replaces the map by surfels in and around the next window.
   void fill(int count) {
     const Nuvg grid(camera_.intrinsics, camera_.config);
     const std::vector<Surfel> surfels = random_surfels(grid, pose_, count, 4, 2, random_);
     const std::vector<std::uint32_t> slots = map().replace(surfels, 1);
     book_ = {};
     for (const std::uint32_t slot : slots) note(slot, to_array(fixture_.access().packed(slot)));
-    EXPECT_EQ(book_.surfels.size(), surfels.size()) << "slots are given twice";
+    EXPECT_EQ(book_.surfels.size(), surfels.size()) << "a slot is used twice";
     for (std::size_t n = 0; n < surfels.size(); ++n) {
       const BlockKey block = block_of(surfels[n].position, kBlock);
       EXPECT_EQ(to_array(fixture_.access().packed(slots[n])), to_array(frontier_surfels::pack(surfels[n], block, kBlock)));
@@ -66,7 +66,7 @@ class Pages {
       if (window.meets_grid(window.block(cell))) cells_.push_back(static_cast<cl_uint>(cell));
   }
 
-  /// Random surfels in a few cells of the window.
+  /// Inserts random surfels into a few cells of the window.
   void insert(int count, int cells) {
     std::vector<cl_uint> some;
     for (int n = 0; n < cells; ++n) some.push_back(cells_[random_.whole(0, static_cast<int>(cells_.size()) - 1)]);
@@ -89,7 +89,7 @@ class Pages {
     check_window();
   }
 
-  /// The window has every page of each cell that may be in the grid, once, in whatever order.
+  /// Expects that the window lists every page of each cell that may be in the grid, once, in any order.
   void check_window() const {
     std::vector<std::uint32_t> expected;
     for (const cl_uint cell : cells_) {
@@ -102,10 +102,10 @@ class Pages {
     EXPECT_TRUE(actual == expected);
     std::size_t in_window = 0;
     for (const auto& [page, block] : book_.pages) in_window += std::count(expected.begin(), expected.end(), page);
-    EXPECT_EQ(in_window, expected.size()) << "pages that hold nothing";
+    EXPECT_EQ(in_window, expected.size()) << "the window lists pages without surfels";
   }
 
-  /// Takes surfels out of the map that is in `pages`; each with a probability.
+  /// Removes each surfel of the map with a probability. @return slots of the removed surfels
   std::set<std::uint32_t> remove(double share) {
     std::vector<std::uint32_t> slots;
     for (const auto& [slot, surfel] : book_.surfels)
@@ -124,7 +124,7 @@ class Pages {
       page = full.count(page->first) ? std::next(page) : book_.pages.erase(page);
   }
 
-  /// Every slot of the map is as the book says.
+  /// Expects that every slot of the map is as in the book.
   void expect_as_in_book() {
     const std::vector<Surfel> all = map().download();
     EXPECT_EQ(map().size(), book_.surfels.size());
@@ -134,7 +134,7 @@ class Pages {
     const std::vector<cl_int4> page_blocks = fixture_.access().blocks_of(pages);
     auto expected = book_.surfels.begin();
     for (std::size_t n = 0; n < all.size(); ++n, ++expected) {
-      ASSERT_EQ(all[n].id, expected->first) << "not by slot";
+      ASSERT_EQ(all[n].id, expected->first) << "the surfels are not ordered by slot";
       const cl_uint4& packed = packed_slots[all[n].id];
       ASSERT_EQ(to_array(packed), expected->second);
       const BlockKey block = book_.pages.at(all[n].id / PAGE_SLOTS);
@@ -147,7 +147,7 @@ class Pages {
   }
 
   Random& random() { return random_; }
-  std::uint32_t last_page() const { return last_page_; }  ///< that was ever in use
+  std::uint32_t last_page() const { return last_page_; }  ///< highest page that was ever in use
 
  private:
   static constexpr double kBlock = 0.5;
@@ -157,7 +157,7 @@ class Pages {
     book_.pages[slot / PAGE_SLOTS] = fixture_.access().block_of_slot(slot);
   }
 
-  /// Each block's new surfels take, in their order, its pages' free slots, lowest first, then those of new pages that nobody has.
+  /// Expects that each block's new surfels take, in order, the free slots of its pages, lowest first, and then the slots of new pages.
   void check_insertion(const std::vector<cl_uint4>& surfels, const std::vector<cl_uint>& where, const std::vector<cl_uint>& slots) {
     std::map<cl_uint, std::vector<std::size_t>> by_cell;
     for (std::size_t n = 0; n < where.size(); ++n) by_cell[where[n]].push_back(n);
@@ -176,7 +176,7 @@ class Pages {
           const auto known = book_.pages.find(page);
           if (known == book_.pages.end()) {
             fresh += PAGE_SLOTS;
-            EXPECT_TRUE(after.pages.emplace(page, block).second) << "page " << page << " is given twice";
+            EXPECT_TRUE(after.pages.emplace(page, block).second) << "page " << page << " is used twice";
           } else {
             EXPECT_EQ(fresh, 0u) << "new pages come last";
             EXPECT_TRUE(known->second == block) << "page " << page << " is another block's";
@@ -200,13 +200,13 @@ class Pages {
   Eigen::Isometry3d pose_ = Random(9).pose(2, 3);
   FrameFixture fixture_;
   Book book_;
-  std::vector<cl_uint> cells_;  ///< that surfels of the grid may be in
+  std::vector<cl_uint> cells_;  ///< cells whose surfels may be in the grid
   std::uint32_t frame_ = 0, last_page_ = 0;
 };
 
 TEST(StageMapPages, InsertedSurfelsTakeFreeSlotsInOrder) {
   for (const int there : {0, 1, 3000})
-    for (const int count : {0, 1, 63, 64, 65, 5000, 20000}) {  // a CPU sorts few in one launch
+    for (const int count : {0, 1, 63, 64, 65, 5000, 20000}) {  // on PoCL few surfels are sorted in one launch
       SCOPED_TRACE(std::to_string(there) + " surfels and " + std::to_string(count) + " more");
       Pages pages(static_cast<unsigned>(there + count));
       pages.fill(there);
@@ -226,7 +226,7 @@ TEST(StageMapPages, ThousandsIntoOneBlock) {
   pages.expect_as_in_book();
 }
 
-/// More than the map had room for.
+/// More pages than the map has room for.
 TEST(StageMapPages, ManyPages) {
   Pages pages(2);
   pages.fill(0);
@@ -249,11 +249,11 @@ TEST(StageMapPages, EmptyPagesAreFreedAndUsedAgain) {
     pages.finish();
     pages.expect_as_in_book();
   }
-  EXPECT_LT(pages.last_page(), most) << "pages pile up";
+  EXPECT_LT(pages.last_page(), most) << "free pages are not reused";
 }
 
-/// All that a frame changed, exactly; and all that frames before it did, page by page.
-TEST(StageMapPages, ChangesAreTold) {
+/// The last frame's changes are reported exactly, and those of earlier frames page by page.
+TEST(StageMapPages, ChangesAreReported) {
   Pages pages(4);
   pages.fill(3000);
   std::vector<std::map<std::uint32_t, Packed>> books = {{}, pages.book().surfels};
@@ -268,7 +268,7 @@ TEST(StageMapPages, ChangesAreTold) {
     for (const Surfel& surfel : exact.updated) told.insert(surfel.id);
     for (const auto& [slot, surfel] : books[frame])
       if (books[frame - 1].count(slot) == 0) expected.insert(slot);
-    EXPECT_TRUE(told == expected) << "frame " << frame << ": " << told.size() << " are told of " << expected.size();
+    EXPECT_TRUE(told == expected) << "frame " << frame << ": " << told.size() << " surfels reported, " << expected.size() << " changed";
   }
   const auto pages_of = [](const std::vector<std::uint32_t>& slots) {
     std::set<std::uint32_t> pages;
@@ -283,8 +283,8 @@ TEST(StageMapPages, ChangesAreTold) {
     const Changes changes = pages.map().changes(since);
     for (const Surfel& surfel : changes.updated) told.push_back(surfel.id);
     EXPECT_TRUE(std::includes(told.begin(), told.end(), changed.begin(), changed.end()));
-    EXPECT_TRUE(pages_of(told) == pages_of(changed)) << "other pages are told";
-    EXPECT_EQ(told.size() + changes.removed.size(), PAGE_SLOTS * pages_of(changed).size()) << "of a page all slots are told";
+    EXPECT_TRUE(pages_of(told) == pages_of(changed)) << "wrong pages are reported";
+    EXPECT_EQ(told.size() + changes.removed.size(), PAGE_SLOTS * pages_of(changed).size()) << "not all slots of the pages are reported";
     for (const std::uint32_t slot : changes.removed) EXPECT_EQ(books.back().count(slot), 0u);
   }
 }
@@ -308,7 +308,7 @@ TEST(StageMapPages, SlotsDoNotDependOnThreads) {
   EXPECT_TRUE(books[0].pages == books[1].pages);
 }
 
-/// Pages near the window are listed once; the others, well beyond, are not.
+/// Pages near the window are listed once, and pages far from it are not.
 TEST(StageMapPages, PagesNearTheWindow) {
   Pages pages(6);
   pages.fill(0);

@@ -1,4 +1,4 @@
-/// kernels/stages/12_median.cl, exactly, against the count of the 27 voxels.
+/// kernels/stages/12_median.cl compared exactly with a count of the 27 voxels.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ void check(CameraSetup camera, double density, int votes) {
   fixture.write(candidate_bits, candidates);
   Median filter(fixture.commands());
   Field<char> expected = median(known, votes),
-              filtered = fixture.read(filter.filter(fixture.frame(), known_bits, candidate_bits));  // where there are candidates
+              filtered = fixture.read(filter.filter(fixture.frame(), known_bits, candidate_bits));  // valid only at candidates
   for (std::size_t n = 0; n < candidates.values.size(); ++n)
     if (!candidates.values[n]) expected.values[n] = filtered.values[n] = 0;
   expect_equal("K~", expected, filtered);

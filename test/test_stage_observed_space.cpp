@@ -1,4 +1,4 @@
-/// kernels/stages/1_observed_space.cl against the literal loop over pixels and layers.
+/// kernels/stages/1_observed_space.cl compared with a literal loop over pixels and layers.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// The kernels of the recent views, and their ring, against the exact test of every candidate in every kept view.
+/// The recent views and their kernels, compared with the exact test of every candidate in every kept view.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 using namespace reference;
 
-/// An image of a wall, a little rough and with holes: unlike random depths it hides what is behind, so that tiles need not ask the view.
+/// An image of a slightly rough wall with holes. Unlike random depths it hides the space behind it, so that many tiles can skip the view.
 WorkingImage wall_image(const CameraSetup& camera, Random& random) {
   WorkingImage image = random_image(camera, Content::all_invalid, random);
   const double distance = random.uniform(camera.config.z_min, 1.2 * camera.config.z_max);
@@ -21,7 +21,7 @@ WorkingImage wall_image(const CameraSetup& camera, Random& random) {
   return image;
 }
 
-/// The candidates that a frame of this camera has left are those that none of the views knows. @return share of those that one knows
+/// Expects that a frame of this camera keeps exactly the candidates that no view knows. @return share of the candidates that a view knows
 double expect_settled(FrameFixture& fixture, const CameraSetup& camera, const std::vector<SeenView>& views,
                       const Eigen::Isometry3d& T_world_camera, Random& random, double density, Candidates& left) {
   fixture.begin(random_image(camera, Content::all_valid, random), T_world_camera);
@@ -42,8 +42,9 @@ double expect_settled(FrameFixture& fixture, const CameraSetup& camera, const st
   return all > 0 ? known / all : 0;
 }
 
-/// @param frames  views before the current one, of which the last config.recent_views are kept
-/// @param walls   those views see walls, from anywhere around
+/// @param frames  number of views before the current one
+/// @param kept    value of recent_views: maximum number of kept views
+/// @param walls   the views see walls, from anywhere around
 /// @return share of candidates that a view knows
 double check(CameraSetup camera, int frames, int kept, Content content, double density, bool walls = false) {
   SCOPED_TRACE(camera.name + ", " + std::to_string(frames) + " frames, " + std::to_string(kept) + " views kept, density " +
@@ -64,7 +65,7 @@ double check(CameraSetup camera, int frames, int kept, Content content, double d
   Candidates left(fixture.commands());
   const double known = expect_settled(fixture, camera, views, T_world_start, random, density, left);
 
-  // The paths that the known space must be computed on: two voxels around what is left.
+  // Known space must be computed on the paths through all voxels within two voxels of a candidate left.
   NeededPaths needed(fixture.commands());
   needed.mark(fixture.frame(), left);
   const std::vector<Field<char>> paths = paths_through(around(fixture.read(left), 2)), actual = read_paths(fixture.grid(), needed);
@@ -84,7 +85,7 @@ TEST(StageRecentViews, FewCandidates) {
 
 TEST(StageRecentViews, EveryVoxelIsACandidate) { check(cameras().front(), 3, 10, Content::all_valid, 1); }
 
-/// More views than a vector has lanes, most of which can know nothing of most tiles, and say so.
+/// More views than a vector has lanes. Most views know nothing of most tiles, and the tiles skip them.
 TEST(StageRecentViews, ViewsOfWallsFromAnywhere) {
   double known = 0;
   for (const CameraSetup& camera : cameras())
@@ -129,13 +130,13 @@ TEST(StageRecentViews, KeepsOnlyViewsThatAddSomething) {
   EXPECT_EQ(fixture.views().count(), 3u);
 }
 
-/// While no view was ever forgotten they alone know what is known, and nothing is left for the surfels to decide.
+/// As long as no view was forgotten, the views alone know all known space.
 TEST(StageRecentViews, CompleteUntilOneIsForgotten) {
   CameraSetup camera = cameras().front();
   camera.config.recent_views = 2;
   Random random(3);
   FrameFixture fixture(camera.config);
-  EXPECT_FALSE(fixture.views().complete()) << "a map was loaded, say";
+  EXPECT_FALSE(fixture.views().complete()) << "the map was not empty";
   fixture.views().clear(true);
   for (const bool complete : {true, true, false, false}) {
     fixture.begin(random_image(camera, Content::mixed, random), random.pose(2, 3));
@@ -144,8 +145,8 @@ TEST(StageRecentViews, CompleteUntilOneIsForgotten) {
   }
 }
 
-/// Whole steps of depth, rounded down, patch by patch, and behind them the largest of each block: of odd sizes, and with as many steps as
-/// there are.
+/// Depths are stored in whole steps, rounded down, patch by patch, followed by the largest depth of each block. Tested with odd image sizes
+/// and with depths that need all 16 bits.
 TEST(StageRecentViews, StoredDepths) {
   for (CameraSetup camera : cameras()) {
     for (const double z_max : {camera.config.z_max, 4.0}) {
@@ -175,7 +176,7 @@ TEST(StageRecentViews, StoredDepths) {
   }
 }
 
-/// More pixels than can be numbered are refused, and a smaller image is taken afterwards.
+/// Images with more pixels than 32 bits can number are refused. A smaller image is accepted afterwards.
 TEST(StageRecentViews, TooManyPixels) {
   Config config;
   config.recent_views = 1024;
@@ -188,7 +189,7 @@ TEST(StageRecentViews, TooManyPixels) {
   EXPECT_TRUE(fixture.views().keep_current());
 }
 
-/// A larger image than ever before needs larger rooms: the kept views move along, and know what they knew.
+/// When a larger image than before comes, the kept views are copied and know the same as before.
 TEST(StageRecentViews, LargerImages) {
   const CameraSetup small = cameras().front();
   CameraSetup large = make_camera(20, 15, 15.1, 15.3, 45);
@@ -211,7 +212,7 @@ TEST(StageRecentViews, LargerImages) {
   }
 }
 
-/// Cameras that stand in the same place see different things: both views are kept.
+/// Views of different cameras with the same pose are both kept.
 TEST(StageRecentViews, CamerasSideBySide) {
   const CameraSetup one = cameras().front(), other = make_camera(7, 5, 20.3, 24.1, 33);
   Random random(4);

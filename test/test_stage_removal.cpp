@@ -1,4 +1,4 @@
-/// The kernels of removal: which surfels go, which candidates the others leave, and what becomes of the map.
+/// The kernels of removal: which surfels are removed, which candidates remain, and how the map changes.
 
 #include <gtest/gtest.h>
 
@@ -18,12 +18,13 @@ using namespace reference;
 
 struct Expected {
   std::vector<Truth> removed;
-  Field<Truth> candidates;                     ///< those left
-  std::size_t closed = 0, on_thin_bodies = 0;  ///< that go for the gap alone; that would, were they not occupied
+  Field<Truth> candidates;         ///< candidates left
+  std::size_t closed = 0;          ///< surfels removed only because they lie on a thin gap
+  std::size_t on_thin_bodies = 0;  ///< surfels that would be removed for this reason if they were not occupied
 };
 
-/// Removed: in an observed voxel, or (where that is asked for) with its back side, r / 4 behind it, seen by this frame, or frontier that
-/// this frame sees min_gap behind.
+/// A surfel is removed if it lies in an observed voxel. With remove_buried also if this frame sees the point r / 4 behind it. With min_gap
+/// also if it is frontier and this frame sees the point min_gap behind it.
 Expected expect_removal(const Nuvg& grid, const Config& config, const SeenView& view, const std::vector<Surfel>& map,
                         const std::vector<ViewSurfel>& in_view, const Field<char>& observed, const Field<char>& candidates) {
   Expected expected = {{}, grid.field(Truth::no), 0, 0};
@@ -72,11 +73,11 @@ Marked check_marks(CameraSetup camera, Content content, int count, double densit
   const SeenView view = {random_image(camera, content, random), random.pose(2, 3), depth_step_for(camera.config.z_max)};
   fixture.map().replace(random_surfels(grid, view.T_world_camera, count, 2, 2, random), 1);
   const std::vector<Surfel> map = fixture.map().download();
-  if (count > 10) fixture.access().kill(some_slots(map, count / 3));  // so that a surfel's number in view is not its slot
+  if (count > 10) fixture.access().kill(some_slots(map, count / 3));  // so that numbers of surfels in view differ from slots
   fixture.begin_and_observe(view.image, view.T_world_camera);
   const Field<char> observed = random_field(fixture.grid(), density, random);
   fixture.write(fixture.observed, observed);
-  Field<char> candidates = random_field(fixture.grid(), 0.5, random);  // which are not observed
+  Field<char> candidates = random_field(fixture.grid(), 0.5, random);  // unobserved voxels only, see the next line
   for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
   fixture.write(fixture.candidates, candidates);
 
@@ -86,7 +87,8 @@ Marked check_marks(CameraSetup camera, Content content, int count, double densit
   const Expected expected = expect_removal(grid, camera.config, view, map, placed.surfels().read(placed.count()), observed, candidates);
   const std::vector<std::uint64_t> in_view_words = fixture.access().words(fixture.visit.in_view()),
                                    removed_words = fixture.access().words(fixture.visit.removed());
-  for (std::size_t n = 0; n < in_view_words.size(); ++n) EXPECT_EQ(removed_words[n] & ~in_view_words[n], 0u) << "others are removed";
+  for (std::size_t n = 0; n < in_view_words.size(); ++n)
+    EXPECT_EQ(removed_words[n] & ~in_view_words[n], 0u) << "surfels out of view are removed";
   const std::vector<std::uint32_t> in_view = fixture.in_view_slots(), removed_slots = fixture.access().slots(removed_words);
   const std::set<std::uint32_t> removed(removed_slots.begin(), removed_slots.end());
   {
@@ -115,13 +117,13 @@ TEST(StageRemoval, NothingAndEverythingObserved) {
   }
 }
 
-TEST(StageRemoval, BuriedSurfelsGo) {
+TEST(StageRemoval, BuriedSurfelsAreRemoved) {
   const CameraSetup camera = cameras().front();
   EXPECT_GT(check_marks(camera, Content::all_valid, 300, 0, true, 0).removed, 5u);
 }
 
-/// Gaps down to a tenth of a voxel; the surfaces of bodies as thin stay.
-TEST(StageRemoval, FrontierOnThinGapsGoes) {
+/// Frontier on gaps down to a tenth of a voxel is removed; the surfaces of equally thin bodies stay.
+TEST(StageRemoval, FrontierOnThinGapsIsRemoved) {
   for (const double min_gap : {0.003, 0.03, 0.3}) {
     std::size_t closed = 0, on_thin_bodies = 0;
     for (const CameraSetup& camera : cameras())

@@ -1,4 +1,4 @@
-/// kernels/common/shared.h: host and device lay the structures out alike.
+/// kernels/common/shared.h: the structures have the same layout on host and device.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace frontier_surfels {
 namespace {
 
-/// A field of a structure; the same list makes the host's offsets and the device's probe kernel.
+/// Fields of each structure. The same lists make the host's offsets and the device's probe kernels.
 // clang-format off
 #define GRID_FIELDS(F) \
   F(size_i)            \
@@ -34,8 +34,8 @@ namespace {
 #define NAME(field) #field,
 #define NAMES(FIELDS) std::vector<std::string>({FIELDS(NAME)})
 
-/// A kernel that returns, of a structure passed by value: its size, each field's offset, each field's bits; then the same of an element of
-/// a buffer of them, as the second one.
+/// Source of a kernel that probes a structure. It returns the size, each field's offset and each field's bits of a structure that is passed
+/// by value, and then each field's bits of the second element of a buffer.
 std::string probe_source(const std::string& type, const std::vector<std::string>& fields) {
   const std::string put = "  out[n++] = ";
   std::string text = "__kernel void probe_" + type + "(__global uint* out, __global const " + type + "* in, const " + type + " value) {\n";

@@ -1,4 +1,5 @@
-/// kernels/stages/9_sign_field.cl against the dense sign field and the definition of its events; with one work item a tile and with 64.
+/// kernels/stages/9_sign_field.cl compared with the dense sign field and the definition of its events, with 1 and with 64 work items per
+/// tile.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ namespace {
 
 using namespace reference;
 
-/// The variant of the kernel that the device's type would not choose.
+/// Builds the variant of the kernel that is not used on this type of device.
 Commands& other_commands() {
   static auto* const commands = [] {
     Device device = test_device();
@@ -29,7 +30,7 @@ Commands& other_commands() {
   return *commands;
 }
 
-/// A surfel in grid coordinates, seen by the view as it must be there; no cosine is near the threshold.
+/// A surfel given in grid coordinates, as the view sees it. Expects that no cosine equals the threshold.
 ViewSurfel make_view_surfel(const Grid& g, const Limits& limits, const Eigen::Vector3d& c, const Eigen::Vector3d& n, double reach) {
   const bool pyramid = c.z() >= g.k_min;
   ViewSurfel s = {};
@@ -47,7 +48,7 @@ ViewSurfel make_view_surfel(const Grid& g, const Limits& limits, const Eigen::Ve
   return s;
 }
 
-/// Surfels in the grid and around it; some are large, as those beyond the grid are not split.
+/// Surfels in the grid and around it. Some are large, because surfels beyond the grid are not split.
 std::vector<ViewSurfel> random_view_surfels(const Grid& g, const Limits& limits, int count, Random& random) {
   std::vector<ViewSurfel> surfels;
   for (int n = 0; n < count; ++n) {
@@ -61,7 +62,7 @@ std::vector<ViewSurfel> random_view_surfels(const Grid& g, const Limits& limits,
   return surfels;
 }
 
-/// Only the paths through `voxels` must be right.
+/// Compares the events on the paths through `voxels`; other paths are not computed.
 void compare(const FrameFixture& fixture, const BitField& events, const reference::SignField& expected, const Field<char>& voxels) {
   const char* names[] = {"enter forward", "exit forward", "enter backward", "exit backward", "invalid"};
   const std::vector<Field<char>> paths = paths_through(voxels);
@@ -80,7 +81,7 @@ void compare(const FrameFixture& fixture, const BitField& events, const referenc
 
 using MakeSurfels = std::function<std::vector<ViewSurfel>(const Grid&, const Limits&)>;
 
-/// As the map has it; its camera stands at the origin.
+/// The surfel in the world frame, for a camera at the origin.
 Surfel to_map(const Nuvg& grid, const ViewSurfel& s) {
   const Eigen::Vector3d p = grid.from_grid(Eigen::Vector3d(s.i, s.j, s.k));
   Surfel surfel;
@@ -90,7 +91,8 @@ Surfel to_map(const Nuvg& grid, const ViewSurfel& s) {
   return surfel;
 }
 
-/// @return all surfels, those in view as they are placed: the map rounds them. Those that are not must make no difference.
+/// Puts surfels into the map and places the ones in view. @return all surfels; the ones in view as placed, because the map rounds them. The
+/// others must make no difference.
 std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fixture, ViewSurfels& view_surfels,
                                      std::vector<ViewSurfel> surfels) {
   const Nuvg grid(camera.intrinsics, camera.config);
@@ -123,12 +125,12 @@ std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fi
   return surfels;
 }
 
-/// @param candidate_density  only the paths around so many voxels are needed; 1: all
+/// @param candidate_density  share of candidate voxels; only the paths around these are needed
 void check(const CameraSetup& camera, const MakeSurfels& make_surfels, double candidate_density = 1) {
   SCOPED_TRACE(camera.name);
   std::optional<reference::SignField> expected;
   for (Commands* commands : {&test_commands(), &other_commands()}) {
-    SCOPED_TRACE(commands->device().is_cpu ? "one work item a tile" : "64 work items a tile");
+    SCOPED_TRACE(commands->device().is_cpu ? "one work item per tile" : "64 work items per tile");
     Random random(1);
     FrameFixture fixture(camera.config, *commands);
     ViewSurfels view_surfels(*commands, fixture.lists());
@@ -140,7 +142,7 @@ void check(const CameraSetup& camera, const MakeSurfels& make_surfels, double ca
     NeededPaths needed(*commands);
     frontier_surfels::SignField field(*commands, fixture.lists());
     need_paths_around(fixture, random_field(grid, 0.5, random), candidate_bits, needed);
-    field.compute(fixture.frame(), needed, view_surfels);  // what it leaves must not matter
+    field.compute(fixture.frame(), needed, view_surfels);  // its results must not affect the next ones
     need_paths_around(fixture, candidates, candidate_bits, needed);
     field.compute(fixture.frame(), needed, view_surfels);
     compare(fixture, field.events(), *expected, around(candidates, 1));

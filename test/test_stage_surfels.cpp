@@ -1,4 +1,4 @@
-/// kernels/common/surfels.cl and the marks of lanes.cl: LANES surfels at a time. Packing is tested in test_surfel_packing.
+/// kernels/common/surfels.cl and the marks of lanes.cl, LANES surfels at a time. test_surfel_packing tests the packing.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ __kernel void test_load(__global float4* out, __global const uint4* in, const Wi
   const Surfels s = load_surfels(&window, in, block, first);
   store_surfels(&s, first, LANES * get_global_size(0), out);
 }
-// Slots from the last to the first; pages are of blocks one after the other along x.
+// Handles the slots from the last to the first. The pages belong to consecutive blocks along x.
 __kernel void test_slots(__global float4* out, __global const uint4* in, const Window window, __global const int4* page_block) {
   const int first = LANES * get_global_id(0), count = LANES * get_global_size(0);
   const Surfels s = surfels_at(&window, in, page_block, as_uintv(count - 1 - first - lane_numbers()));
@@ -33,7 +33,7 @@ __kernel void test_slots(__global float4* out, __global const uint4* in, const W
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void test_shared_words(__global ulong* out, __global const int* in) {
   __local SharedWord words[PAGE_GROUP / PAGE_ITEMS];
   const int word = get_local_id(0) / PAGE_ITEMS, item = get_local_id(0) % PAGE_ITEMS;
-  words[word] = (SharedWord){{0xffff, 0xffff}};  // what was there before does not matter
+  words[word] = (SharedWord){{0xffff, 0xffff}};  // earlier contents must not matter
   barrier(CLK_LOCAL_MEM_FENCE);
   share_lane_bits(lane_bits(vloadv(get_global_id(0), in)), item, &words[word]);
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -81,11 +81,12 @@ float as_float(cl_uint bits) {
   return value;
 }
 
-/// @param block  of the surfel, counted from the window's first one;  out  what the kernel says of it, [3][count] from its first number on
+/// @param block  block of the surfel, relative to the window's first block
+/// @param out    the kernel's output for the surfel, out[3][count] from the surfel's first entry on
 void expect_unpacked(const cl_uint4& packed, const BlockKey& block, double block_size, const cl_float4* out, std::size_t count) {
   const Surfel host = unpack(packed, block, block_size);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(out[0].s[axis], host.position[axis]) << "exact";
+    EXPECT_EQ(out[0].s[axis], host.position[axis]) << "must be exact";
     EXPECT_NEAR(out[count].s[axis], host.normal[axis], 5e-7);
   }
   EXPECT_EQ(out[0].s[3], host.radius);
@@ -99,7 +100,7 @@ TEST(StageSurfels, Loading) {
     for (int run = 0; run < 10; ++run) {
       const Window window = {random.whole(-2000, 2000),     random.whole(-9, 9), random.whole(-9, 9), 20, 20, 20,
                              static_cast<float>(block_size)};
-      const BlockKey block = {random.whole(0, 19), random.whole(0, 19), 0};  // from the window's first
+      const BlockKey block = {random.whole(0, 19), random.whole(0, 19), 0};  // relative to the window's first block
       const cl_int4 in_world = {{window.origin_x + block.x, window.origin_y + block.y, window.origin_z, 77}};
       const std::vector<cl_uint4> surfels = random_packed(256, block_size, random);
       const auto out =

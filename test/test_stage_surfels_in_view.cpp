@@ -1,4 +1,4 @@
-/// kernels/stages/3_visit.cl: which surfels reach into the grid, how it sees them, and their split.
+/// kernels/stages/3_visit.cl and 4_split.cl: which surfels reach into the grid, how the grid sees them, and how they are split.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using namespace reference;
 
-/// How often a surfel is split: until r < 2 sqrt(3) delta(z). Open: too close to call.
+/// Number of times a surfel is split, until r < 2 sqrt(3) delta(z). Open: too close to the limit to decide.
 struct Levels {
   int levels;
   bool open;
@@ -35,14 +35,14 @@ Levels split_levels(const Nuvg& grid, const SeenSurfel& s) {
   return result;
 }
 
-/// A map with some free slots, and a view of it. No surfel is so large that its split is a matter of rounding.
+/// A map with some free slots, and a view of it. No surfel is so close to the limit that rounding decides whether it is split.
 struct Scene {
   CameraSetup camera;
   Nuvg grid;
   Eigen::Isometry3d T_world_camera;
   VisitFixture fixture;
 
-  /// @param anywhere  so many more are put around the camera
+  /// @param anywhere  number of additional surfels around the camera
   Scene(const CameraSetup& with_camera, int count, double around, double largest, unsigned seed, Commands& commands = test_commands(),
         int anywhere = 0)
       : camera(with_camera), grid(camera.intrinsics, camera.config), fixture(camera.config, commands) {
@@ -60,12 +60,12 @@ struct Scene {
     for (const std::uint32_t slot : fixture.map().replace(surfels, 1))
       if (slot / PAGE_SLOTS % 4 != 3 && random.chance(0.1)) dead.push_back(slot);  // full pages stay
     fixture.access().kill(dead);
-    fixture.begin_and_observe(random_image(camera, Content::all_invalid, random), T_world_camera);  // nothing: no surfel is at a surface
+    fixture.begin_and_observe(random_image(camera, Content::all_invalid, random), T_world_camera);  // no surfaces to label surfels at
   }
   SeenSurfel seen(const Surfel& surfel) const { return see(grid, T_world_camera.inverse(), surfel); }
 };
 
-/// Does a voxel of the grid, or one beside it, lie in the surfel's ellipsoid?
+/// Does the surfel's ellipsoid contain the centre of a voxel of the grid, or of a voxel beside the grid?
 bool touches_grid(const Scene& scene, const SeenSurfel& s) {
   for (int i = -1; i <= scene.grid.size_i; ++i)
     for (int j = -1; j <= scene.grid.size_j; ++j)
@@ -79,11 +79,11 @@ bool touches_grid(const Scene& scene, const SeenSurfel& s) {
   return false;
 }
 
-/// Is the surfel so far beyond the grid that even a generous selection leaves it out?
+/// Is the surfel so far from the grid that it must not be selected? The kernel may select some surfels nearby that do not touch the grid.
 bool far_from_grid(const Scene& scene, const SeenSurfel& s) {
   const double reach = 3 * (std::max(s.rho, scene.camera.config.thickness) + 2);  // [voxel]
   for (int axis = 0; axis < 2; ++axis) {
-    const double slope = std::abs(s.p_camera[axis]) / std::max(s.p_camera.z(), scene.grid.z_min);  // in the cuboid, too
+    const double slope = std::abs(s.p_camera[axis]) / std::max(s.p_camera.z(), scene.grid.z_min);  // holds in the cuboid, too
     const double along = reach * (1 + slope), size = axis == 0 ? scene.grid.size_i : scene.grid.size_j;
     if (s.c[axis] < -along || s.c[axis] > size + along) return true;
   }
@@ -91,10 +91,10 @@ bool far_from_grid(const Scene& scene, const SeenSurfel& s) {
 }
 
 struct Selected {
-  std::size_t must = 0, must_not = 0;
+  std::size_t must = 0, must_not = 0;  ///< numbers of surfels that must be in view, and that must not
 };
 
-/// All surfels of the map that may touch the grid are in view, and none that is far from it.
+/// Expects that all surfels that touch the grid are in view, and none that is far from it.
 Selected check_selection(const Scene& scene) {
   Selected selected;
   std::vector<std::uint32_t> slots = scene.fixture.in_view_slots();
@@ -132,7 +132,7 @@ TEST(StageSurfelsInView, Selection) {
   EXPECT_GT(all.must_not, small_tests() ? 3u : 50u) << "nothing was tested";
 }
 
-/// Pages that are full, partly full and empty; with all, some and none of their surfels in view.
+/// Full, partly full and empty pages, with all, some and none of their surfels in view.
 TEST(StageSurfelsInView, Pages) {
   std::size_t full = 0, partly = 0, empty = 0, all = 0, some = 0, none = 0;
   for (const CameraSetup& camera : cameras()) {
@@ -170,7 +170,7 @@ TEST(StageSurfelsInView, Pages) {
   EXPECT_TRUE(full > 0 || small_tests());
 }
 
-/// The slots to be split are those of large surfels in the grid. @return how many
+/// Expects that the large surfels are the ones in the grid that are to be split. @return their number
 std::size_t check_large(const Scene& scene) {
   const std::vector<std::uint32_t> slots = scene.fixture.access().slots(scene.fixture.visit.large());
   const std::set<std::uint32_t> large(slots.begin(), slots.end());
@@ -227,7 +227,7 @@ TEST(StageSurfelsInView, HowTheGridSeesThem) {
       ASSERT_EQ(actual.slot, slots[n]);
       EXPECT_EQ(actual.ragged, actual.slot == surfels[3].id || actual.slot == surfels[50].id || actual.slot == surfels[90].id ? 1u : 0u);
       const SeenSurfel s = scene.seen(map.at(actual.slot));
-      if (std::abs(s.p_camera.z() - scene.grid.z_min) < 1e-5) continue;  // either part of the grid
+      if (std::abs(s.p_camera.z() - scene.grid.z_min) < 1e-5) continue;  // may be in the cuboid or in the pyramid
       SCOPED_TRACE("slot " + std::to_string(actual.slot));
       EXPECT_NEAR(actual.i, s.c.x(), 1e-3);
       EXPECT_NEAR(actual.j, s.c.y(), 1e-3);
@@ -243,7 +243,7 @@ TEST(StageSurfelsInView, HowTheGridSeesThem) {
   }
 }
 
-/// Four of r / 2 at p +- r / (2 sqrt 2) x_psi +- r / (2 sqrt 2) y_psi, literally, again and again.
+/// Splits literally, `levels` times: four surfels of radius r / 2 at p +- r / (2 sqrt 2) x_psi +- r / (2 sqrt 2) y_psi.
 void split_literally(const Vector3d& p, double r, int levels, const Vector3d& x_psi, const Vector3d& y_psi,
                      std::vector<Vector3d>& centers) {
   if (levels == 0) {
@@ -255,7 +255,7 @@ void split_literally(const Vector3d& p, double r, int levels, const Vector3d& x_
     for (const int b : {-1, 1}) split_literally(p + step * (a * x_psi + b * y_psi), r / 2, levels - 1, x_psi, y_psi, centers);
 }
 
-/// @param step  of the map's positions [m]
+/// @param step  step of the map's positions [m]
 void check_children(const Surfel& parent, int levels, const std::vector<Surfel>& children, double step) {
   const Vector3d p = parent.position.cast<double>(), n = parent.normal.cast<double>();
   Vector3d corner = Vector3d::Zero();
@@ -264,12 +264,12 @@ void check_children(const Surfel& parent, int levels, const std::vector<Surfel>&
     const Vector3d offset = child.position.cast<double>() - p;
     if (offset.norm() > corner.norm()) corner = offset;
     EXPECT_NEAR(offset.dot(n), 0, 1e-4 * parent.radius + step);
-    EXPECT_EQ(child.radius, parent.radius / static_cast<float>(1 << levels)) << "16 bits hold it exactly";
+    EXPECT_EQ(child.radius, parent.radius / static_cast<float>(1 << levels)) << "16 bits must hold it exactly";
     EXPECT_TRUE(child.normal == parent.normal && child.label == parent.label && child.rgb == parent.rgb);
     area += static_cast<double>(child.radius) * child.radius;
   }
   EXPECT_NEAR(area, static_cast<double>(parent.radius) * parent.radius, 1e-5 * area);
-  // Which axes span the disc is free, so they are taken from the result: a corner lies between x_psi and y_psi.
+  // Any two axes may span the disc. They are taken from the result: a corner lies between x_psi and y_psi.
   const Vector3d x_psi = Eigen::AngleAxisd(-M_PI / 4, n) * corner.normalized();
   std::vector<Vector3d> expected;
   split_literally(p, parent.radius, levels, x_psi, n.cross(x_psi), expected);
@@ -289,18 +289,18 @@ BySlot by_slot(const std::vector<Surfel>& surfels) {
   return sorted;
 }
 
-/// What splitting has made of the surfels in view, and what is told of it.
+/// Result of splitting, and the changes that should be reported.
 struct Split {
   std::size_t parents = 0, children = 0;
   int most_levels = 0;
   std::set<std::uint32_t> updated, removed;
 };
 
-/// @param in_view  slots, page after page;  parents are split in this order
+/// @param in_view  slots of the surfels in view, page after page; parents are split in this order
 Split check_split(const Scene& scene, const BySlot& before, const std::vector<std::uint32_t>& in_view) {
   const BySlot after = by_slot(scene.fixture.map().download());
   Split split;
-  std::vector<std::pair<std::uint32_t, int>> parents;  // and their levels
+  std::vector<std::pair<std::uint32_t, int>> parents;  // slots and levels
   std::set<std::uint32_t> stay;
   for (const auto& [slot, surfel] : before) stay.insert(slot);
   for (const std::uint32_t slot : in_view) {
@@ -328,7 +328,7 @@ Split check_split(const Scene& scene, const BySlot& before, const std::vector<st
     }
     check_children(before.at(slot), levels, of_parent, position_step(scene.camera.config));
   }
-  for (const std::uint32_t slot : split.updated) split.removed.erase(slot);  // taken again
+  for (const std::uint32_t slot : split.updated) split.removed.erase(slot);  // a child took the parent's slot
   return split;
 }
 
@@ -342,8 +342,8 @@ TEST(StageSurfelsInView, Split) {
     const std::vector<std::uint32_t> in_view = scene.fixture.in_view_slots();
     const std::size_t added = scene.fixture.split();
     const Split split = check_split(scene, before, in_view);
-    check_selection(scene);  // children are in view, or not, like others; parents no more
-    check_large(scene);      // again, at their own depth
+    check_selection(scene);  // children are treated like other surfels; parents are gone
+    check_large(scene);      // children at another depth may be large again
     EXPECT_EQ(added, split.children - split.parents);
     EXPECT_EQ(scene.fixture.map().size(), before.size() + added);
     most_levels = std::max(most_levels, split.most_levels);
@@ -357,7 +357,7 @@ TEST(StageSurfelsInView, Split) {
   EXPECT_GE(most_levels, 3) << "nothing was tested";
 }
 
-/// What is found out of the surfels of a frame that splits some is as if they had been small before.
+/// After a split the results are the same as if the surfels had been small before.
 TEST(StageSurfelsInView, NothingIsLeftOfParents) {
   std::size_t added = 0, removed = 0;
   for (const CameraSetup& camera : cameras()) {

@@ -1,4 +1,4 @@
-/// kernels/stages/11_sweeps.cl, exactly, against Algorithm 1 walked one path at a time on random events.
+/// kernels/stages/11_sweeps.cl compared exactly with Algorithm 1, walked one path at a time, on random events.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 using namespace reference;
 
 struct Densities {
-  double event = 0, invalid = 0, hull = 0;  ///< shares of voxels (of cells); all events at once may fall on one voxel
+  double event = 0, invalid = 0, hull = 0;  ///< shares of voxels, and of the hull's cells; a voxel may have several events
 };
 
 struct Input {
@@ -47,7 +47,7 @@ void check(const CameraSetup& camera, const Densities& densities) {
   NeededPaths needed(fixture.commands());
   need_paths_around(fixture, Field<char>(fixture.grid(), 1), candidates, needed);
   PathSweeps sweeps(fixture.commands());
-  for (int frame = 0; frame < 2; ++frame) {  // what the first one leaves must not matter to the second
+  for (int frame = 0; frame < 2; ++frame) {  // the first frame's results must not affect the second
     Input input(fixture.commands());
     fill(input, fixture, densities, random);
     sweeps.sweep(fixture.frame(), needed, input.event_bits, input.hull_bits);
@@ -72,7 +72,7 @@ TEST(StageSweeps, AllInvalid) {
   for (const CameraSetup& camera : cameras()) check(camera, {0.5, 1, 1});
 }
 
-/// Where few candidates are left only the paths around them are walked: K' is right where the median looks, and so is K~ at the candidates.
+/// With few candidates only the paths around them are walked. K' must be right where the median reads it, and K~ at the candidates.
 TEST(StageSweeps, AroundFewCandidates) {
   for (const CameraSetup& camera : cameras()) {
     SCOPED_TRACE(camera.name);
@@ -86,7 +86,7 @@ TEST(StageSweeps, AroundFewCandidates) {
     NeededPaths needed(fixture.commands());
     PathSweeps sweeps(fixture.commands());
     need_paths_around(fixture, Field<char>(fixture.grid(), 1), candidate_bits, needed);
-    sweeps.sweep(fixture.frame(), needed, before.event_bits, before.hull_bits);  // what it leaves must not matter
+    sweeps.sweep(fixture.frame(), needed, before.event_bits, before.hull_bits);  // its results must not affect the next ones
     const Field<char> candidates = random_field(fixture.grid(), 0.001, random);
     need_paths_around(fixture, candidates, candidate_bits, needed);
     sweeps.sweep(fixture.frame(), needed, input.event_bits, input.hull_bits);

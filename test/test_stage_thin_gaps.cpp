@@ -1,4 +1,4 @@
-/// Candidates on sheets of unknown that are too thin, against the exact test of every candidate's back in every view.
+/// Candidates on thin sheets of unknown space, compared with the exact test of the point behind every candidate in every view.
 
 #include <gtest/gtest.h>
 
@@ -24,10 +24,11 @@ struct Scene {
   Field<char> observed;
 };
 
-/// Of the candidates that no view knows: how many lie on gaps that this view alone closes, or the kept ones alone; and how many would,
-/// were they not at a measured surface.
+/// Numbers of candidates that no view knows.
 struct Tally {
-  std::size_t by_current = 0, by_kept = 0, at_surfaces = 0;
+  std::size_t by_current = 0;   ///< on gaps that only the current view closes
+  std::size_t by_kept = 0;      ///< on gaps that only kept views close
+  std::size_t at_surfaces = 0;  ///< on such gaps, but at a measured surface
   void operator+=(const Tally& other) {
     by_current += other.by_current;
     by_kept += other.by_kept;
@@ -35,7 +36,7 @@ struct Tally {
   }
 };
 
-/// Is a candidate left out: no measured surface, with a normal, and known again `min_gap` behind its centre?
+/// Is a candidate left out? It is if it has a normal, lies at no measured surface, and the point `min_gap` behind its centre is known.
 Truth closes(const Scene& scene, const Vector3i& v, Tally& tally) {
   const Config& config = scene.camera.config;
   const Vector3d center = scene.grid.center_of(v.x(), v.y(), v.z()), sum = sum_of_directions(scene.grid, scene.observed, v);
@@ -48,19 +49,19 @@ Truth closes(const Scene& scene, const Vector3i& v, Tally& tally) {
   tally.by_current += (by_current && !by_kept && !surface) == Truth::yes;
   tally.by_kept += (by_kept && !by_current && !surface) == Truth::yes;
   tally.at_surfaces += (known && surface) == Truth::yes;
-  // Where directions nearly cancel, their sum's direction is too uncertain in float.
+  // If the directions nearly cancel, the direction of their sum is too uncertain in float.
   return sum.norm() < 0.1 && !(surface == Truth::yes) ? Truth::open : known && !surface;
 }
 
 struct Setup {
   double min_gap;
-  int frames;  ///< views before the current one; with the configured number kept
+  int frames;  ///< number of views before the current one
   int recent_views;
   Content content;
   double surface_depth;
 };
 
-/// What the stage needs of others.
+/// The results of other stages that the stage needs.
 struct GapsFixture : FrameFixture {
   explicit GapsFixture(const Config& config)
       : FrameFixture(config),
@@ -71,13 +72,13 @@ struct GapsFixture : FrameFixture {
         settling(commands()) {}
 
   ObservedSpace space;
-  BitField observed;  ///< C~, which need not be that of `space`
+  BitField observed;  ///< C~; may differ from the result of `space`
   Candidates candidates;
   CandidateList list;
   ViewSettling settling;
 };
 
-/// @param observed_density  of a random C~; negative: the image's own
+/// @param observed_density  density of a random C~; negative: the image's own C~
 Scene prepare(CameraSetup camera, const Setup& setup, double observed_density, GapsFixture& fixture, Random& random) {
   Scene scene = {camera, Nuvg(camera.intrinsics, camera.config), {}, {}, {}, {}};
   const Eigen::Isometry3d T_world_start = random.pose(2, 3);
@@ -90,14 +91,14 @@ Scene prepare(CameraSetup camera, const Setup& setup, double observed_density, G
   }
   scene.current = {random_image(camera, setup.content, random), T_world_start, depth_step};
   fixture.begin(scene.current.image, T_world_start);
-  fixture.space.compute(fixture.frame(), fixture.camera());  // where the columns end
+  fixture.space.compute(fixture.frame(), fixture.camera());  // gives the ends of the columns
   scene.observed = observed_density >= 0 ? random_field(fixture.grid(), observed_density, random) : fixture.read(fixture.space.bits());
   fixture.write(fixture.observed, scene.observed);
   scene.layer_depth = fixture.layer_depth();
   return scene;
 }
 
-/// @param anywhere  candidates at random unobserved voxels; else those that section 3.5 has
+/// @param anywhere  candidates are random unobserved voxels, else the ones of section 3.5
 Tally check(CameraSetup camera, const Setup& setup, double observed_density, bool anywhere) {
   SCOPED_TRACE(camera.name + ", gaps of " + std::to_string(setup.min_gap) + " m, " + std::to_string(setup.frames) + " frames, " +
                std::to_string(setup.recent_views) + " views kept, density " + std::to_string(observed_density));
@@ -144,7 +145,7 @@ TEST(StageThinGaps, RandomViews) {
   }
 }
 
-/// With the frame's own C~ and the candidates around it.
+/// The frame's own C~ and the candidates beside it.
 TEST(StageThinGaps, CandidatesOfTheFrame) {
   Tally tally;
   for (const CameraSetup& camera : cameras())
@@ -176,7 +177,7 @@ TEST(StageThinGaps, NothingIsKnownBehindEmptyViews) {
   EXPECT_EQ(tally.by_current + tally.by_kept, 0u);
 }
 
-TEST(StageThinGaps, AllIsKeptIfSoConfigured) { check(cameras().front(), {0, 3, 10, Content::all_valid, kSurfaceDepth}, 0.2, true); }
+TEST(StageThinGaps, WithoutMinGapAllCandidatesStay) { check(cameras().front(), {0, 3, 10, Content::all_valid, kSurfaceDepth}, 0.2, true); }
 
 }  // namespace
 }  // namespace frontier_surfels

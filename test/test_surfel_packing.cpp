@@ -1,4 +1,4 @@
-/// 16 bytes a surfel: what the host packs and unpacks against an independent computation, and the kernels' packing against the host's.
+/// Packing a surfel into 16 bytes: the host compared with an independent computation, and the kernels compared with the host.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 using reference::Random;
 
-/// By the format's definition, in double precision, one number at a time.
+/// A surfel unpacked by the format's definition, in double precision.
 struct Unpacked {
   Vector3d position, normal;
   double radius;
@@ -29,14 +29,14 @@ Unpacked unpack_slowly(const cl_uint4& packed, const BlockKey& block, double blo
                              (block.z + (within[2] + 0.5) / 65536) * block_size);
   const int half = static_cast<int>(y / 65536);  // sign 1, exponent 5, mantissa 10 bits
   surfel.radius = std::ldexp(1 + (half % 1024) / 1024.0, half / 1024 % 32 - 15);
-  // An octahedron |x| + |y| + |z| = 1, its lower corners folded outwards: the place (a, b) there is (a, b) mirrored at the nearest edge.
+  // (a, b) are x and y on the octahedron |x| + |y| + |z| = 1. Its lower half is folded outwards, mirrored at the edges |x| + |y| = 1.
   const double a = signed_16(z % 65536) / 32767, b = signed_16(z / 65536) / 32767, up = 1 - std::abs(a) - std::abs(b);
   surfel.normal = up >= 0 ? Vector3d(a, b, up) : Vector3d(std::copysign(1 - std::abs(b), a), std::copysign(1 - std::abs(a), b), up);
   surfel.normal.normalize();
   return surfel;
 }
 
-constexpr double kNormalStep = 1e-4;  // angle between neighbours: their octahedron's faces are stretched by up to 3
+constexpr double kNormalStep = 1e-4;  // largest angle between neighbouring normals [rad]; mapping the octahedron stretches by up to 3
 
 Vector3d awkward_direction(Random& random) {
   switch (random.whole(0, 5)) {
@@ -44,12 +44,12 @@ Vector3d awkward_direction(Random& random) {
       return random.direction();
     case 1:
       return (random.chance(0.5) ? 1 : -1) * Vector3d::Unit(random.whole(0, 2));
-    case 2: {  // one component tiny, of either sign
+    case 2: {  // one tiny component of either sign
       Vector3d n = random.direction();
       n[random.whole(0, 2)] = (random.chance(0.5) ? 1 : -1) * std::pow(10, random.uniform(-40, -3));
       return n.normalized();
     }
-    case 3: {  // two of them
+    case 3: {  // two tiny components
       Vector3d n = (random.chance(0.5) ? 1 : -1) * Vector3d::Unit(random.whole(0, 2));
       return (n + random.uniform(0, 1e-4) * random.direction()).normalized();
     }
@@ -85,7 +85,7 @@ Surfel awkward_surfel(const Vector3d& around, double block_size, Random& random)
   return surfel;
 }
 
-/// Half a step of a 16-bit float; none is smaller than 2^-14 or much larger than 65000.
+/// Expects an error of at most half a step of a 16-bit float. Stored radii are limited to 6.2e-5 to 65000 m.
 void expect_radius(double actual, double wanted) {
   const double clamped = std::clamp(wanted, 6.2e-5, 65000.0);
   EXPECT_LE(std::abs(actual - clamped), clamped / 2048 * 1.001);
@@ -108,7 +108,7 @@ TEST(SurfelPacking, BlocksAreHalfOpen) {
       }
 }
 
-TEST(SurfelPacking, IsWithinAQuantum) {
+TEST(SurfelPacking, IsExactToAStep) {
   Random random(2);
   for (const double block_size : {0.5, 2.0})
     for (const Vector3d& place : kPlaces)
@@ -134,9 +134,9 @@ TEST(SurfelPacking, IsWithinAQuantum) {
       }
 }
 
-/// What was unpacked once is packed again without loss: maps do not creep from file to file. Far from the origin, where floats are coarser
-/// than the map, it is so from the first time on.
-TEST(SurfelPacking, StaysAsItIs) {
+/// An unpacked surfel is packed again without loss, so that maps do not drift when they are saved and loaded repeatedly. This must hold
+/// also far from the origin, where floats are coarser than the map.
+TEST(SurfelPacking, RepeatedPackingLosesNothing) {
   Random random(3);
   for (const Vector3d& place : {kPlaces[0], kPlaces[1], Vector3d(90, -100, 70), kPlaces[2], kPlaces[3]})
     for (int n = 0; n < 20000; ++n) {
@@ -152,12 +152,12 @@ TEST(SurfelPacking, StaysAsItIs) {
     }
 }
 
-/// What kernels make of a surfel: packed (4), cell and its block (4), then unpacked position and radius (4), normal (4).
+/// Numbers per surfel in the kernel's output: packed (4), cell and its block (4), then unpacked position and radius (4), normal (4).
 constexpr std::size_t kOut = 16;
 
 TestKernels& kernels() {
   static auto* const kernels = new TestKernels(R"(
-// in[2]: position and radius, normal of each surfel
+// in[2] of each surfel: position and radius, normal
 __kernel void pack_and_unpack(__global int4* out, __global const float4* in, const Window window) {
   const int first = LANES * get_global_id(0);
   const intv at = first + lane_numbers();
@@ -178,7 +178,7 @@ __kernel void pack_and_unpack(__global int4* out, __global const float4* in, con
   return *kernels;
 }
 
-/// @return kOut numbers for each surfel
+/// Packs and unpacks surfels in a kernel. @return kOut numbers for each surfel
 std::vector<cl_uint> pack_and_unpack(const std::vector<Surfel>& surfels, const Window& window) {
   std::vector<std::array<cl_float4, 2>> in;
   for (const Surfel& s : surfels)
@@ -186,7 +186,7 @@ std::vector<cl_uint> pack_and_unpack(const std::vector<Surfel>& surfels, const W
   return kernels().run_lanes<cl_uint>("pack_and_unpack", in, kOut, window);
 }
 
-/// Surfels of a window, in its local frame.
+/// Random surfels in a window, in its local frame.
 std::vector<Surfel> surfels_of(const Window& window, int count, Random& random) {
   const Eigen::Vector3f size = Eigen::Vector3f(window.size_x, window.size_y, window.size_z) * window.block_size;
   std::vector<Surfel> surfels;
@@ -203,10 +203,10 @@ float as_float(std::uint32_t bits) {
   return value;
 }
 
-/// @param out  of the kernel for this surfel
+/// @param out  the kernel's output for this surfel
 void expect_as_on_host(const Window& window, const Surfel& surfel, const std::uint32_t* out) {
   SCOPED_TRACE(testing::Message() << surfel.position.transpose() << ", normal " << surfel.normal.transpose());
-  const BlockKey block = block_of(surfel.position, window.block_size);  // counted from the window's corner
+  const BlockKey block = block_of(surfel.position, window.block_size);  // relative to the window's corner
   const cl_uint4 host = pack(surfel, block, window.block_size);
   ASSERT_LT(out[4], static_cast<std::uint32_t>(window.size_x * window.size_y * window.size_z));
   const int x = out[4] % window.size_x, y = out[4] / window.size_x % window.size_y, z = out[4] / window.size_x / window.size_y;
@@ -223,7 +223,7 @@ void expect_as_on_host(const Window& window, const Surfel& surfel, const std::ui
   EXPECT_LE((slow.position - surfel.position.cast<double>()).cwiseAbs().maxCoeff(), 0.65 * window.block_size / 65536);
   expect_radius(slow.radius, surfel.radius);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_EQ(as_float(out[8 + axis]), slow.position[axis]) << "exact";
+    EXPECT_EQ(as_float(out[8 + axis]), slow.position[axis]) << "must be exact";
     EXPECT_NEAR(as_float(out[12 + axis]), slow.normal[axis], 1e-6);
   }
   EXPECT_EQ(as_float(out[11]), slow.radius);
@@ -238,8 +238,8 @@ TEST(SurfelPacking, KernelsPackAsTheHostDoes) {
   }
 }
 
-/// Unpacked by a kernel and packed again, as splitting does with normals.
-TEST(SurfelPacking, KernelsKeepWhatTheyUnpack) {
+/// A kernel that packs an unpacked surfel again loses nothing. Splitting does this with normals.
+TEST(SurfelPacking, KernelsRepackWithoutLoss) {
   Random random(5);
   const Window window = {0, 0, 0, 9, 7, 8, 0.5F};
   std::vector<Surfel> surfels = surfels_of(window, reference::small_tests() ? 200 : 20000, random);

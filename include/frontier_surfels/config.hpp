@@ -51,13 +51,13 @@ struct Config {
   std::vector<std::string> problems() const;
 };
 
-/// What is known of a field beside its value.
+/// Description of a field.
 struct FieldInfo {
   const char* name;
-  const char* unit;     ///< "" if there is none
-  const char* meaning;  ///< one sentence
-  double lowest = 0;    ///< of numbers only; both ends are allowed
-  double highest = 0;
+  const char* unit;        ///< "" if there is none
+  const char* meaning;     ///< one sentence
+  double lowest = 0;       ///< smallest allowed value, for numbers only
+  double highest = 0;      ///< largest allowed value, for numbers only
   const char* group = "";  ///< heading in the table of parameters
 };
 
@@ -73,7 +73,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"platform", "", "part of the name of the OpenCL platform, in any case; empty: the first one with a suitable device"},
         config.platform);
   field(FieldInfo{"device_type", "", "type of the OpenCL device: any, cpu, gpu or accelerator"}, config.device_type);
-  field(FieldInfo{"device_index", "", "which of the suitable devices to use", 0, 255}, config.device_index);
+  field(FieldInfo{"device_index", "", "number of the suitable device to use, from 0", 0, 255}, config.device_index);
   field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
   field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 on other devices", 0, 16},
         config.lanes);
@@ -96,19 +96,21 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.th_d);
   field(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);
   field(FieldInfo{"thickness", "voxel", "reach of a surfel along its normal in the sign field", 0.5, 4}, config.thickness);
-  field(FieldInfo{"median_votes", "voxel", "a voxel is known if at least so many of the 27 voxels around and in it are", 1, 27},
+  field(FieldInfo{"median_votes", "voxel", "a voxel is known if at least this many are known among it and its 26 neighbours", 1, 27},
         config.median_votes);
 
   group = "Recent views";
   field(FieldInfo{"recent_views", "", "maximum number of kept views; 0: the paper's method alone", 0, 1024}, config.recent_views);
-  field(FieldInfo{"recent_view_distance", "m", "a view is kept if its camera is at least this far from that of every kept view, or ...", 0,
-                  100},
+  field(FieldInfo{"recent_view_distance", "m",
+                  "a view is kept if the camera has moved this far from every kept view, or turned by recent_view_angle", 0, 100},
         config.recent_view_distance);
-  field(FieldInfo{"recent_view_angle", "deg", "... turned by at least this angle against it", 0, 180}, config.recent_view_angle);
+  field(FieldInfo{"recent_view_angle", "deg",
+                  "a view is kept if the camera has turned this much from every kept view, or moved by recent_view_distance", 0, 180},
+        config.recent_view_angle);
 
   group = "Removal, creation and labels";
   field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);
-  field(FieldInfo{"min_gap", "m", "frontier on a sheet of unknown space thinner than this is left out; 0: none is left out", 0, 1},
+  field(FieldInfo{"min_gap", "m", "no frontier on sheets of unknown space that are thinner than this; 0: all frontier is kept", 0, 1},
         config.min_gap);
   field(FieldInfo{"refine_surfels", "",
                   "whether new surfels move from the centre of their voxel to the boundary, and turn if known space before them is thin"},
@@ -131,12 +133,12 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
 /// @throws Error      names every unknown, repeated or malformed entry with file and line
 Config load_config(const std::string& path);
 
-/// Sets one field from text, as --set key=value does. @throws Error  if there is no such field (names the most similar one), or the text is
-/// not of its type
+/// Sets one field from text, as --set key=value does.
+/// @throws Error  there is no such field (the message suggests the most similar name), or the text is not of its type
 void set_field(Config& config, const std::string& name, const std::string& value);
 
-/// "; did you mean 'x'?" with the name most similar to `name` among the fields of Config and `more`. If none is similar, where to find all
-/// names.
+/// "; did you mean 'x'?" with the name most similar to `name` among the fields of Config and `more`. If none is similar, says where to
+/// find all names.
 std::string suggestion(const std::string& name, const std::vector<std::string>& more = {});
 
 /// The configuration as YAML that load_config reads back.

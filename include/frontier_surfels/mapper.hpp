@@ -1,4 +1,4 @@
-/// Open first: the whole library in one class.
+/// Read this first: the whole library in one class.
 ///
 /// A Mapper keeps a cloud of surfels that encloses all space its depth camera has seen (Monica & Aleotti, "Surfel-Based
 /// Incremental Reconstruction of the Boundary between Known and Unknown Space", IEEE TVCG 2020).
@@ -16,54 +16,55 @@ namespace frontier_surfels {
 class Mapper {
  public:
   /// Chooses the device and builds all kernels.
-  /// @throws Error        config.problems() is not empty: all of them
-  /// @throws DeviceError  no device fits (with a list of those there are), or the kernels do not build
-  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, or is of another block size
+  /// @throws Error        the configuration has problems; the message lists all of them
+  /// @throws DeviceError  no device fits (the message lists all devices), or the kernels do not build
+  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, or has another block size
   explicit Mapper(const Config& config = {});
   ~Mapper();
   Mapper(Mapper&&) noexcept;
   Mapper& operator=(Mapper&&) noexcept;
 
-  /// Psi_n -> Psi_(n+1): one pass of the paper's flow chart.
-  /// With a map_folder, the map near the camera is brought into memory first, and what is far leaves it.
+  /// Updates the map with a frame, Psi_n -> Psi_(n+1): one pass of the paper's flow chart.
+  /// With a map_folder, first loads blocks near the camera into memory and moves far blocks out of memory.
   /// @throws BadFrame     the frame is unusable; nothing has changed
-  /// @throws FileError    the map folder cannot be read here, or could not be written lately: the frame is refused, nothing is lost, and
-  ///                      the next one may come; changes() tells of parts of the map that have come into memory, or left it, nevertheless
+  /// @throws FileError    the map folder cannot be read, or an earlier write to it has failed. The frame is refused, the map loses nothing,
+  ///                      and later frames may succeed. Blocks may have entered or left memory all the same; changes() reports these
   /// @throws DeviceError  the device failed or is out of memory
   Report integrate(const DepthFrame& frame);
 
-  /// All surfels, ordered by id. With a map_folder: those in memory, near the camera; none before the first frame.
+  /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame.
   std::vector<Surfel> surfels() const;
 
   /// The surfels whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
 
-  /// What has changed since the map had sequence number `since` (0: everything): the last frame's changes exactly, earlier ones with some
-  /// surfels around that have not changed, and ids that were free already. Surfels that go to the map folder are removed, and updated with
-  /// new ids when they come back.
+  /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact. Those of earlier
+  /// frames may also contain unchanged surfels near changed ones, and ids that were free before. Surfels that move to the map folder are
+  /// reported as removed, and as updated with new ids when they come back.
   Changes changes(std::uint64_t since) const;
 
-  /// Writes the map as a PLY file, to a temporary file first that is then renamed. With a map_folder all of it, which must fit into memory
-  /// for that moment. @throws FileError
+  /// Writes the map as a PLY file: first to a temporary file, which is then renamed. With a map_folder, the file has the whole map, which
+  /// must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
-  /// Replaces the map by a saved one, and forgets what is not in the file: the recent views, and which surfels stand in thin space (the
-  /// method then trusts those a little more). With a map_folder, the map in it is replaced, too. @throws FileError: the map stays as it was
+  /// Replaces the map by a saved one; with a map_folder, also the map in the folder. The recent views are forgotten, and so is which
+  /// surfels stand in thin space (the method trusts these a little more from then on), because the file does not have it.
+  /// @throws FileError  the file cannot be used; the map stays as it was
   void load(const std::string& path);
 
-  /// The same from memory; ids are given anew. Surfels far larger than any that this mapper makes (of 2 m, where z_max is up to 12 m)
-  /// become so small.
+  /// Replaces the map by these surfels, which get new ids. Radii are limited to four blocks (2 m where z_max is at most 12 m), which is far
+  /// more than this mapper makes.
   void load(const std::vector<Surfel>& surfels);
 
-  /// Forgets everything but the configuration and the sequence number, the map in the map folder included.
+  /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
   void reset();
 
   Statistics statistics() const;
-  std::size_t size() const;  ///< surfels in the map; with a map_folder, in memory
+  std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
   std::uint64_t sequence() const;
   const Config& config() const;
 
-  /// Platform, name and compute units of the device in use, for people.
+  /// Platform, name and compute units of the device in use, for display.
   std::string device() const;
 
  private:

@@ -20,7 +20,7 @@ std::string range_text(const FieldInfo& info) { return to_text(info.lowest) + " 
 
 std::string with_unit(const std::string& value, const FieldInfo& info) { return *info.unit ? value + " " + info.unit : value; }
 
-/// Levenshtein's distance: how many letters must be added, dropped or replaced to make `b` of `a`.
+/// Levenshtein distance: number of letters to add, drop or replace to turn `a` into `b`.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), 0);
@@ -58,7 +58,7 @@ std::string suggestion(const std::string& name, const std::vector<std::string>& 
   const Config defaults;
   for_each_field(defaults, [&](const FieldInfo& info, const auto&) { names.push_back(info.name); });
   std::string nearest;
-  std::size_t smallest = 2 + name.size() / 4;  // further away is another word
+  std::size_t smallest = 2 + name.size() / 4;  // more edits mean another word
   for (const std::string& candidate : names) {
     const std::size_t distance = edit_distance(name, candidate);
     if (distance < smallest) {

@@ -1,4 +1,4 @@
-/// Values of Config fields as text: one way for YAML files, sentences and tables.
+/// Values of Config fields as text, the same in YAML files, sentences and tables.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ inline std::string to_text(bool value) { return value ? "true" : "false"; }
 inline std::string to_text(int value) { return std::to_string(value); }
 inline std::string to_text(const std::string& value) { return value; }
 
-/// The shortest decimal text that reads back as the same number; .nan, .inf, -.inf as YAML writes them.
+/// The shortest decimal text that reads back as the same number; .nan, .inf or -.inf as in YAML.
 std::string to_text(double value);
 
 }  // namespace frontier_surfels

@@ -19,7 +19,7 @@ const char* type_text(int) { return "a whole number"; }
 const char* type_text(double) { return "a number"; }
 const char* type_text(const std::string&) { return "text"; }
 
-/// Sets the field of that name. @return what is wrong, a sentence, or empty
+/// Sets the field `name`. @return a sentence that says what is wrong, or empty
 std::string assign(Config& config, const std::string& name, const YAML::Node& value) {
   std::string fault = "there is no parameter '" + name + "'" + suggestion(name);
   for_each_field(config, [&](const FieldInfo& info, auto& field) {

@@ -5,7 +5,7 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kMostCameras = 16;  // a driver that changes its intrinsics with every frame must not fill the memory
+constexpr std::size_t kMaxCameras = 16;  // limits the memory if a driver changes its intrinsics with every frame
 
 }  // namespace
 
@@ -38,7 +38,7 @@ Camera& Cameras::find(const Intrinsics& intrinsics) {
     cameras_.splice(cameras_.begin(), cameras_, found);
   } else {
     cameras_.emplace_front(commands_, intrinsics, config_);
-    if (cameras_.size() > kMostCameras) cameras_.pop_back();
+    if (cameras_.size() > kMaxCameras) cameras_.pop_back();
   }
   return cameras_.front();
 }

@@ -1,4 +1,4 @@
-/// A depth camera on the device: the grid of its views with its fixed tables, and its newest image.
+/// A depth camera on the device: the grid of its views, the grid's fixed tables, and the newest image.
 #pragma once
 
 #include <list>
@@ -18,13 +18,13 @@ class Camera {
   /// @throws BadFrame   the grid would be too large
   Camera(Commands& commands, const Intrinsics& intrinsics, const Config& config);
 
-  /// Sends the working image of a frame. Its intrinsics must be this camera's.
+  /// Sends a frame's working image to the device. Its intrinsics must be this camera's.
   void set_image(const WorkingImage& image);
 
   const Intrinsics& intrinsics() const { return intrinsics_; }
   const Grid& grid() const { return grid_; }
 
-  /// @name Tables, fixed: see ViewGrid
+  /// @name Fixed tables, see ViewGrid
   /// @{
   const DeviceArray<float>& layer_depth() const { return layer_depth_; }
   const DeviceArray<PixelRange>& pixels_i() const { return pixels_i_; }
@@ -32,7 +32,7 @@ class Camera {
   const DeviceArray<PixelRange>& words_i() const { return words_i_; }
   /// @}
 
-  /// @name The image, [height][width]: see WorkingImage
+  /// @name Newest image, [height][width], see WorkingImage
   /// @{
   const SentArray<float>& depth() const { return depth_; }
   const SentArray<cl_uint>& color() const { return color_; }
@@ -49,19 +49,19 @@ class Camera {
   bool has_color_ = false;
 };
 
-/// The cameras that frames have come from lately. Cameras that take turns keep their tables.
+/// The cameras of recent frames. Cameras that take turns keep their tables.
 class Cameras {
  public:
   Cameras(Commands& commands, const Config& config) : commands_(commands), config_(config) {}
 
-  /// The camera with these intrinsics of its working image; a new one if there is none. The reference holds until the next call.
-  /// @throws BadFrame  its grid would be too large
+  /// Finds the camera with these intrinsics (of its working image), or makes one. The reference is valid until the next call.
+  /// @throws BadFrame  the grid would be too large
   Camera& find(const Intrinsics& intrinsics);
 
  private:
   Commands& commands_;
   const Config config_;
-  std::list<Camera> cameras_;  ///< the one used last comes first
+  std::list<Camera> cameras_;  ///< most recently used first
 };
 
 }  // namespace frontier_surfels

@@ -1,4 +1,4 @@
-/// The numbers of the method that kernels are told: those of the configuration, and those that the paper fixes.
+/// The method's numbers for the kernels: parameters of the configuration, and constants.
 #pragma once
 
 #include "common/shared.h"

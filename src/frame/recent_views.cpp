@@ -8,7 +8,7 @@
 namespace frontier_surfels {
 namespace {
 
-/// Rounded down: what lies between is not claimed to have been seen. z_max itself may be one step more than there are.
+/// A depth in steps, rounded down, so that nothing counts as seen that was not. z_max may be one step more than 16 bits hold.
 cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
 
 /// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
@@ -32,7 +32,7 @@ constexpr int kPatch = PATCH_COLUMNS * PATCH_ROWS;
 
 int patches(int pixels, int side) { return (pixels + side - 1) / side; }
 
-/// A view's depths as the kernels read them: patch by patch, in steps, without the signs. What lies beyond the image's edges is 0.
+/// A view's depths in the kernels' layout: patch by patch, in steps, without signs. Pixels beyond the image's edges are 0.
 std::vector<cl_ushort> by_patches(const WorkingImage& image, float per_step) {
   const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS);
   std::vector<cl_ushort> depths(static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch, 0);
@@ -52,14 +52,14 @@ Transform to_transform(const Eigen::Matrix<double, 3, 4>& matrix) {
   return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2), m(0, 3), m(1, 3), m(2, 3)};
 }
 
-/// Camera to image; half a pixel is added, so that what is rounded down is the nearest pixel.
+/// Projection from the camera to the image, shifted by half a pixel: coordinates rounded down are the nearest pixel.
 Eigen::Matrix3d projection(const Intrinsics& camera) {
   Eigen::Matrix3d K;
   K << camera.fx, 0, camera.cx + 0.5, 0, camera.fy, camera.cy + 0.5, 0, 0, 1;
   return K;
 }
 
-/// Puts a view into its lane of a group: lane[VIEW_LANE_FIELDS][VIEW_GROUP] from its first number on.
+/// Writes a view into its lane of a group, lane[VIEW_LANE_FIELDS][VIEW_GROUP]. @param lane  the view's first number
 void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, std::uint32_t first_pixel, float* lane) {
   const auto set = [lane](int field, double value) { lane[field * VIEW_GROUP] = static_cast<float>(value); };
   for (int row = 0; row < 3; ++row) {
@@ -75,8 +75,8 @@ void set_lane(const Eigen::Isometry3d& T_view_camera, const Intrinsics& camera, 
   std::memcpy(&lane[VIEW_LANE_FIRST_PIXEL * VIEW_GROUP], &first_pixel, sizeof(first_pixel));
 }
 
-/// The kept views in an order in which each is far from those before it: what is still unknown after a few is unknown to most, and what is
-/// known has been found. Multiples of the golden section are spread so.
+/// An order of the kept views in which each is far from the ones before it. Then a few views already find most points that any view knows.
+/// Multiples of the golden ratio are spread like this.
 std::vector<std::size_t> spread(std::size_t count) {
   constexpr double kGolden = 0.6180339887498949;
   std::vector<std::size_t> order;
@@ -113,20 +113,20 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   const auto per_step = static_cast<float>(1 / depth_step_);
   std::vector<cl_ushort> depths = by_patches(image, per_step);
   for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
-  // The patches of the next room must not lie across lines of the cache; and pixels are read two at a time.
+  // A room has whole patches: those of the next room must not cross cache lines, and pixels are read in pairs.
   depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
   if (depths.size() > room_size_) enlarge_rooms(depths.size());
   current_ = {image.intrinsics, T_world_camera, free_room()};
   depths_.send(std::move(depths), current_.room * room_size_);
 }
 
-/// The kept views move along with their rooms.
+/// Makes every room larger; the kept images are copied.
 void RecentViews::enlarge_rooms(std::size_t size) {
   const std::size_t rooms = config_.recent_views + 1;
   const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
-  if (pixels > std::numeric_limits<std::int32_t>::max())  // their numbers have 32 bits
-    throw BadFrame("The " + std::to_string(config_.recent_views) + " views that are kept would have " + std::to_string(pixels * 1e-9) +
-                   " billion pixels, more than 2; raise decimation or lower recent_views.");
+  if (pixels > std::numeric_limits<std::int32_t>::max())  // pixels are numbered with 32 bits
+    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + std::to_string(pixels * 1e-9) +
+                   " billion pixels, more than 2 billion; raise decimation or lower recent_views.");
   std::size_t used = 0;
   for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);
   depths_.widen_rows(rooms, used, room_size_, size);
@@ -166,7 +166,7 @@ int RecentViews::prepare() {
   return static_cast<int>(kept_.size());
 }
 
-bool RecentViews::adds_something() const {
+bool RecentViews::differs_enough() const {
   const double cos_angle = std::cos(config_.recent_view_angle * M_PI / 180);
   return std::none_of(kept_.begin(), kept_.end(), [&](const Kept& kept) {
     if (!same_camera(kept.intrinsics, current_.intrinsics)) return false;
@@ -177,7 +177,7 @@ bool RecentViews::adds_something() const {
 }
 
 bool RecentViews::keep_current() {
-  if (config_.recent_views == 0 || !adds_something()) return false;
+  if (config_.recent_views == 0 || !differs_enough()) return false;
   if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
     kept_.pop_back();
     complete_ = false;

@@ -1,4 +1,4 @@
-/// The ring of recent views - our addition to the paper: exact knowledge of what the last views have seen.
+/// The recent views, our addition to the paper: their kept depth images tell exactly what the last views have seen.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,37 +12,37 @@
 
 namespace frontier_surfels {
 
-/// T as the kernels take it.
+/// T in the kernels' format.
 Transform to_transform(const Eigen::Isometry3d& T);
 
-/// Depths of views are kept as whole numbers of such steps [m]: a power of two, so that they are exact numbers again; at most z_max /
-/// 32768.
+/// Step of the kept depths [m]; they are stored as whole numbers of steps. At most z_max / 32768, and a power of two, so that the
+/// conversion back is exact.
 double depth_step_for(double z_max);
 
 class RecentViews {
  public:
   RecentViews(Commands& commands, const Config& config);
 
-  /// Sends this frame's depths to the device; they are own_view()'s until the next call. Images may be of different sizes.
-  /// @throws BadFrame  the image is too large for as many views as are kept
+  /// Makes a frame's view the current one and sends its depths to the device. Images may differ in size.
+  /// @throws BadFrame  the image is too large for the number of kept views
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
-  View own_view() const;  ///< this frame's, as its own camera sees it
+  View own_view() const;  ///< the current view, seen from its own camera
 
-  /// Sends the kept views, each with its pose relative to the current camera. @return how many there are
+  /// Sends the kept views to the device, each with its pose relative to the current camera. @return their number
   int prepare();
 
-  /// Keeps the current view if it adds something. @return whether it did
+  /// Keeps the current view if its camera or pose differs enough from every kept view. @return whether it was kept
   bool keep_current();
 
-  /// Have all views ever kept since the map was empty been kept until now? Then they alone know what is known.
+  /// Are all views that were kept since the map was empty still kept? Then the kept views alone know all known space.
   bool complete() const { return complete_; }
 
-  /// Forgets all views. @param map_is_empty  whether there is nothing that only they knew
+  /// Forgets all views. @param map_is_empty  whether the map is empty, too, so that complete() becomes true
   void clear(bool map_is_empty);
 
   const cl::Buffer& views() const { return views_(); }
   const cl::Buffer& depths() const { return depths_(); }
-  /// The views that prepare() has sent once more, by fields: [view_groups()][VIEW_LANE_FIELDS][VIEW_GROUP], zeros behind the last.
+  /// The views sent by prepare(), field by field in groups: [view_groups()][VIEW_LANE_FIELDS][VIEW_GROUP], filled up with zeros.
   const cl::Buffer& view_lanes() const { return view_lanes_(); }
   std::size_t view_groups() const { return (kept_.size() + VIEW_GROUP - 1) / VIEW_GROUP; }
   std::size_t count() const { return kept_.size(); }
@@ -51,23 +51,23 @@ class RecentViews {
   struct Kept {
     Intrinsics intrinsics;
     Eigen::Isometry3d T_world_camera;
-    std::size_t room = 0;  ///< in the pool
+    std::size_t room = 0;  ///< row of depths_
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
-  bool adds_something() const;
+  bool differs_enough() const;
   void enlarge_rooms(std::size_t size);
   std::size_t free_room() const;
 
   Config config_;
   double depth_step_;          ///< [m]
-  std::size_t room_size_ = 0;  ///< what the largest image so far takes
+  std::size_t room_size_ = 0;  ///< elements that the largest image so far takes
   Kept current_;
   std::deque<Kept> kept_;  ///< newest first
   bool complete_;
   SentArray<View> views_;
   SentArray<float> view_lanes_;
-  /// [recent_views + 1][room_size_]: the kept views' images and the current one's, in steps of depth_step_; behind each the largest depth
-  /// in each block of VIEW_BLOCK x VIEW_BLOCK pixels: beyond it a view knows nothing there.
+  /// [recent_views + 1][room_size_], in steps of depth_step_: images of the kept views and of the current one. Behind each image follows
+  /// the largest depth of each block of VIEW_BLOCK x VIEW_BLOCK pixels; the view knows nothing beyond that depth.
   DeviceArray<cl_ushort> depths_;
 };
 

@@ -10,11 +10,11 @@ namespace {
 struct Axis {
   int size, pixels;         ///< [voxel], [pixel]
   double c, f;              ///< principal point, focal length [pixel]
-  int padding_k, layers_k;  ///< layers without samples; layers
+  int padding_k, layers_k;  ///< number of layers without samples, and of all layers of the cuboid
   double center;            ///< [voxel]
 };
 
-/// Pixels whose sample of layer k lies in each voxel: s with round((s - c) (k - k_p) / f + center) = voxel.
+/// Finds for each voxel of layer k the pixels whose sample lies in it: all s with round((s - c) (k - k_p) / f + center) = voxel.
 void set_footprints(const Axis& axis, int k, PixelRange* ranges) {
   for (int s = 0; s < axis.pixels; ++s) {
     const double voxel = std::floor((s - axis.c) * (k - axis.padding_k) / axis.f + axis.center + 0.5);
@@ -32,7 +32,7 @@ std::vector<PixelRange> find_pixels(const Axis& axis) {
   return pixels;
 }
 
-/// The words of 32 pixels that each chunk's pixels lie in.
+/// For each chunk of LANES voxels the words of 32 pixels in which its pixels lie.
 std::vector<PixelRange> find_words(const std::vector<PixelRange>& pixels) {
   std::vector<PixelRange> words(pixels.size() / TABLE_CHUNK, PixelRange{0, 0});
   for (std::size_t n = 0; n < pixels.size(); ++n) {
@@ -50,10 +50,10 @@ ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
   const double f = (camera.fx + camera.fy) / 2, k_min = config.padding_k + f;
   const double size_k = std::ceil(f * std::log(config.z_max / config.z_min) + k_min) + 1;
   const double size_i = camera.width + 2 * config.padding_i, size_j = camera.height + 2 * config.padding_j;
-  constexpr double kMostVoxels = 2e9;  // 32-bit numbers of voxels
-  if (size_i * size_j * (size_k + 64) > kMostVoxels)
+  constexpr double kMaxVoxels = 2e9;  // voxels are numbered with 32 bits
+  if (size_i * size_j * (size_k + 64) > kMaxVoxels)
     throw BadFrame("The view's grid would have " + std::to_string(size_i * size_j * size_k * 1e-9) +
-                   " billion voxels, more than 2; raise decimation or lower z_max.");
+                   " billion voxels, more than 2 billion; raise decimation or lower z_max.");
 
   ViewGrid view;
   Grid& g = view.grid;

@@ -11,17 +11,17 @@
 
 namespace frontier_surfels {
 
-/// First and one past the last pixel of a row or column.
+/// Range of pixels along a row or column: the first one, and one past the last one.
 using PixelRange = std::array<std::uint16_t, 2>;
 
-/// pixels: of the working image, those whose samples of the cuboid's layers lie in each voxel along an axis; empty where there are none.
-/// Layers are filled up to whole words of the bit fields, and voxels to whole chunks of TABLE_CHUNK.
+/// The grid and its tables. For each voxel along i and j of the cuboid's layers they give the range of the working image's pixels whose
+/// samples lie in the voxel; the range may be empty. The tables have whole 64-bit words of layers and whole chunks of TABLE_CHUNK voxels.
 struct ViewGrid {
   Grid grid = {};
   std::vector<float> layer_depth;    ///< [size_k]: z of each layer's centre [m]
-  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][TABLE_CHUNK]: columns
-  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][TABLE_CHUNK]: rows
-  std::vector<PixelRange> words_i;   ///< [layers][chunks]: words of 32 pixels that the columns of a chunk lie in
+  std::vector<PixelRange> pixels_i;  ///< [layers][chunks][TABLE_CHUNK]: range of columns for each voxel along i
+  std::vector<PixelRange> pixels_j;  ///< [layers][chunks][TABLE_CHUNK]: range of rows for each voxel along j
+  std::vector<PixelRange> words_i;   ///< [layers][chunks]: range of 32-pixel words with the columns of a chunk
 };
 
 /// @param intrinsics  of the working image

@@ -14,7 +14,7 @@ void check_depth(const DepthImage& image, const Config& config) {
   if (image.width < config.decimation || image.height < config.decimation)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
                    std::to_string(config.decimation) + "; lower decimation.");
-  constexpr int kLargest = 16384;  // the cuboid's tables have 16 bits
+  constexpr int kLargest = 16384;  // [pixel]; pixel numbers in the cuboid's tables have 16 bits
   if (image.width > kLargest || image.height > kLargest)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
                    size_text(kLargest, kLargest) + ".");
@@ -25,13 +25,13 @@ void check_depth(const DepthImage& image, const Config& config) {
 }
 
 void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
-  constexpr double kMost = 1e6, kLeast = 1e-3;  // [pixel]; beyond, floats overflow
-  if (!(k.fx >= kLeast && k.fy >= kLeast && std::isfinite(k.fx) && std::isfinite(k.fy)))
+  constexpr double kMaxPrincipalPoint = 1e6, kMinFocalLength = 1e-3;  // [pixel]; beyond these floats overflow
+  if (!(k.fx >= kMinFocalLength && k.fy >= kMinFocalLength && std::isfinite(k.fx) && std::isfinite(k.fy)))
     throw BadFrame("The focal lengths " + std::to_string(k.fx) + ", " + std::to_string(k.fy) +
                    " must be positive: is the camera calibrated, and its camera_info published?");
-  if (!(std::abs(k.cx) <= kMost && std::abs(k.cy) <= kMost))
+  if (!(std::abs(k.cx) <= kMaxPrincipalPoint && std::abs(k.cy) <= kMaxPrincipalPoint))
     throw BadFrame("The principal point " + std::to_string(k.cx) + ", " + std::to_string(k.cy) +
-                   " of the camera is not a number, or nowhere near the image: is its camera_info right?");
+                   " of the camera is not a number or far outside the image: is its camera_info right?");
   if (k.width != image.width || k.height != image.height)
     throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +
                    size_text(image.width, image.height) + ".");
@@ -53,7 +53,7 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
                    size_text(depth.width, depth.height) + ".");
   if (color.data == nullptr || (color.channels != 3 && color.channels != 4) ||
       color.step < static_cast<std::size_t>(color.width) * color.channels)
-    throw BadFrame("The colour image must have 3 or 4 bytes a pixel and rows no shorter than that.");
+    throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
 float to_metres(std::uint16_t millimetres, bool swap_bytes) {
@@ -67,7 +67,7 @@ float to_metres(std::uint32_t bits, bool swap_bytes) {
   return metres;
 }
 
-/// What a depth says: > 0 a surface, < 0 nothing up to its magnitude, 0 no measurement.
+/// Meaning of a raw depth [m]: > 0 a surface at this depth, < 0 free space up to its magnitude, 0 no measurement.
 float interpret(float d, const Config& config) {
   const float z_max = static_cast<float>(config.z_max);
   if (std::isnan(d) || d < static_cast<float>(config.z_min)) return 0;
@@ -75,7 +75,7 @@ float interpret(float d, const Config& config) {
   return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
 }
 
-/// Every step-th pixel of every step-th row. @tparam Pixel  as the image has them
+/// Depths of every decimation-th pixel in both directions [m]. @tparam Pixel  unsigned integer of the image's pixel size
 template <typename Pixel>
 std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
   std::vector<float> depth;

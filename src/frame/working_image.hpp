@@ -1,4 +1,4 @@
-/// A frame, checked and reduced to what the method works on.
+/// The working image: a frame's depths and colours after checking and decimation.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@ namespace frontier_surfels {
 
 struct WorkingImage {
   Intrinsics intrinsics;             ///< of the decimated image
-  std::vector<float> depth;          ///< depth[height][width] [m]: > 0 surface, < 0 nothing up to -depth, 0 no measurement
+  std::vector<float> depth;          ///< depth[height][width] [m]: > 0 surface, < 0 free space up to -depth, 0 no measurement
   std::vector<std::uint32_t> color;  ///< [height][width]: red | green << 8 | blue << 16; empty if the frame has none
 };
 
 /// Are these the intrinsics of the same camera?
 bool same_camera(const Intrinsics& a, const Intrinsics& b);
 
-/// Every decimation-th pixel of both directions, nearest neighbour; intrinsics divided alike.
+/// Takes every decimation-th pixel in both directions, without averaging, and divides the intrinsics by the decimation.
 /// @throws BadFrame  a sentence that names what is wrong with the frame
 WorkingImage make_working_image(const DepthFrame& frame, const Config& config);
 

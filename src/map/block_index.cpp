@@ -37,13 +37,13 @@ void BlockIndex::remove_page(const BlockKey& block, std::uint32_t page) {
 void BlockIndex::skip_to(std::size_t end) {
   const Pages free = free_;
   free_.clear();
-  for (auto page = static_cast<std::uint32_t>(end); page > end_;) free_.push_back(--page);  // the lowest is taken first
+  for (auto page = static_cast<std::uint32_t>(end); page > end_;) free_.push_back(--page);  // descending, as add_page() takes the last
   free_.insert(free_.end(), free.begin(), free.end());
   end_ = std::max(end_, static_cast<std::uint32_t>(end));
 }
 
 std::size_t BlockIndex::bytes() const {
-  constexpr std::size_t kNode = sizeof(BlockKey) + sizeof(Pages) + 2 * sizeof(void*) + 8;  // of the hash table, and its bucket
+  constexpr std::size_t kNode = sizeof(BlockKey) + sizeof(Pages) + 2 * sizeof(void*) + 8;  // of the hash table, with its bucket
   return blocks_.size() * kNode + used() * 2 * sizeof(std::uint32_t) + free_.capacity() * sizeof(std::uint32_t);
 }
 

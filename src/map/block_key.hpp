@@ -1,4 +1,4 @@
-/// Which block of the map: the cube of the world whose corner lies at (x, y, z) block sizes.
+/// Key of a block of the map: the cube of the world whose lowest corner is (x, y, z) times the block size.
 #pragma once
 
 #include <cstddef>
@@ -20,12 +20,12 @@ inline bool operator==(const BlockKey& a, const BlockKey& b) { return a.x == b.x
 inline bool operator!=(const BlockKey& a, const BlockKey& b) { return !(a == b); }
 inline bool operator<(const BlockKey& a, const BlockKey& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
 
-/// A block and its surfels as bytes; without bytes it is one to be erased.
+/// A block and its packed surfels as bytes. No bytes mean that the block is to be erased.
 using StoredBlock = std::pair<BlockKey, std::vector<std::uint8_t>>;
 
 }  // namespace frontier_surfels
 
-/// Neighbouring blocks fall far apart: multiplied by large odd numbers, and the high bits folded into the low ones.
+/// Multiplies by large odd numbers and folds high bits into low ones, so that neighbouring blocks get very different hashes.
 template <>
 struct std::hash<frontier_surfels::BlockKey> {
   std::size_t operator()(const frontier_surfels::BlockKey& key) const noexcept {

@@ -8,9 +8,9 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr double kMostCells = 1 << 20;  // a grid of 24 blocks' range and 150 degrees of view has fewer
+constexpr double kMaxCells = 1 << 20;  // enough for a range of 24 blocks and a field of view of 150 degrees
 
-/// The tangents of the grid's borders, seen from the camera: low and high along i, low and high along j.
+/// Slopes x / z and y / z of the grid's borders in the camera frame: low and high along i, low and high along j.
 Eigen::Vector4d border_slopes(const Grid& g) {
   return {(-0.5 - g.center_i) / g.fx, (g.size_i - 0.5 - g.center_i) / g.fx, (-0.5 - g.center_j) / g.fy,
           (g.size_j - 0.5 - g.center_j) / g.fy};
@@ -21,15 +21,19 @@ double far_end(const Grid& g) { return g.z_min * std::exp((g.size_k - g.k_min) /
 
 /// An axis of the grid's cross-section.
 struct Axis {
-  double f, center, size;  ///< [pixel], [voxel], [voxel]
+  double f, center, size;  ///< focal length [pixel], optical axis [voxel], number of voxels
 };
 
-/// Is no surfel of a box in view along an axis? Where i = f x / m + center is a surfel's place, m being its depth but at least z_min, it is
-/// beside the grid if i <= -reach (1 + |x| / m), or as far beyond the other end. Times m both are half spaces, or two, before m >= z_min.
-/// @param x, z  of the box's corners, camera frame [m];  reach  the largest of a surfel there [voxel]
+/// Do all surfels with centres in a box lie beside the grid along an axis, that is, all below its low end or all above its high end?
+///
+/// A surfel at (x, z) has the grid coordinate i = f x / m + center, where m = max(z, z_min). It lies beside the grid if
+/// i <= -reach (1 + |x| / m) or i >= size + reach (1 + |x| / m). Multiplied by m, each condition says that a function of x
+/// and z is at most 0. If the function is convex, this holds in the whole box when it holds at the corners.
+/// @param x, z   coordinates of the box's corners, camera frame [m]
+/// @param reach  largest reach of a surfel in the box [voxel]
 bool is_beside(const Axis& axis, const Eigen::Array<double, 8, 1>& x, const Eigen::Array<double, 8, 1>& z, double z_min, double reach) {
   const Eigen::Array<double, 8, 1> m = z.max(z_min), at = axis.f * x + axis.center * m, beyond = reach * (m + x.abs());
-  const bool bent = z.minCoeff() < z_min;  // then only a border that bends outwards bounds what is convex
+  const bool bent = z.minCoeff() < z_min;  // m is not linear in the box: the function is convex only if m's factor is not negative
   const bool low = (at <= -beyond).all() && (!bent || axis.center + reach >= 0),
              high = (at - axis.size * m >= beyond).all() && (!bent || axis.size + reach - axis.center >= 0);
   return low || high;
@@ -51,7 +55,7 @@ double block_size_for(double z_max) {
 MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin,
                      const SurfelExtent& extent)
     : grid_(grid), extent_(extent), z_far_(far_end(grid)) {
-  // Between the grid's two ends its cross-section lies within that of their convex hull.
+  // The grid lies within the convex hull of its two ends.
   const Eigen::Vector4d slopes = border_slopes(grid);
   Eigen::AlignedBox3d box;
   for (const auto& [z, scale] :
@@ -61,7 +65,7 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
   const Eigen::Vector3d low = ((box.min().array() - margin) / block_size).floor(),
                         high = ((box.max().array() + margin) / block_size).floor();
   const Eigen::Vector3d size = high - low + Eigen::Vector3d::Ones();
-  if (!(size.prod() < kMostCells))
+  if (!(size.prod() < kMaxCells))
     throw BadFrame("The view's grid would be " + std::to_string(size.maxCoeff() * block_size) + " m large, too much for a range of " +
                    std::to_string(grid.z_max) + " m; check the intrinsics.");
   window_.origin_x = static_cast<int>(low.x());
@@ -89,25 +93,25 @@ bool MapWindow::meets_grid(const BlockKey& block) const {
     p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
   const auto x = p.col(0), y = p.col(1), z = p.col(2);
   const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
-  constexpr double kRounded = 1.001,
-                   kMore = REACH_MARGIN + 0.1;  // radii are kept with 11 bits; [voxel], a tenth for rounding in the kernel
-  const double reach = std::max(2 * kRounded * extent_.largest_radius / voxel_low, extent_.thickness) + kMore;  // [voxel]
+  constexpr double kRadiusRounding = 1.001;       // stored radii have 11 bits
+  constexpr double kMargin = REACH_MARGIN + 0.1;  // [voxel]; the kernel's margin, and 0.1 for the kernel's rounding
+  const double reach = std::max(2 * kRadiusRounding * extent_.largest_radius / voxel_low, extent_.thickness) + kMargin;  // [voxel]
   if (z.maxCoeff() < -(grid_.padding_k + reach) * grid_.delta_min) return false;
-  // Surfels reach the further, the deeper they are, but not as fast as depth grows.
-  if (2 * (extent_.thickness + kMore) < grid_.f && z.minCoeff() > std::max<double>(grid_.z_max, z_far_) + 2 * reach * voxel_low)
+  // The reach of surfels grows with their depth, but more slowly than the depth, so the nearest corner decides.
+  if (2 * (extent_.thickness + kMargin) < grid_.f && z.minCoeff() > std::max<double>(grid_.z_max, z_far_) + 2 * reach * voxel_low)
     return false;
   return !is_beside({grid_.fx, grid_.center_i, double(grid_.size_i)}, x, z, grid_.z_min, reach) &&
          !is_beside({grid_.fy, grid_.center_j, double(grid_.size_j)}, y, z, grid_.z_min, reach);
 }
 
-std::vector<BlockKey> MapWindow::blocks_near(double distance, std::size_t most) const {
-  const int more = static_cast<int>(std::floor(distance / window_.block_size)) + 1;  // those that only touch it, too, as is_near()
-  const std::size_t size_x = window_.size_x + 2 * more, size_y = window_.size_y + 2 * more, size_z = window_.size_z + 2 * more;
+std::vector<BlockKey> MapWindow::blocks_near(double distance, std::size_t max_count) const {
+  const int around = static_cast<int>(std::floor(distance / window_.block_size)) + 1;  // [block]; as in is_near(), touching is near
+  const std::size_t size_x = window_.size_x + 2 * around, size_y = window_.size_y + 2 * around, size_z = window_.size_z + 2 * around;
   std::vector<BlockKey> blocks;
-  if (size_x * size_y * size_z > most) return blocks;
-  for (int z = -more; z < window_.size_z + more; ++z)
-    for (int y = -more; y < window_.size_y + more; ++y)
-      for (int x = -more; x < window_.size_x + more; ++x)
+  if (size_x * size_y * size_z > max_count) return blocks;
+  for (int z = -around; z < window_.size_z + around; ++z)
+    for (int y = -around; y < window_.size_y + around; ++y)
+      for (int x = -around; x < window_.size_x + around; ++x)
         blocks.push_back({window_.origin_x + x, window_.origin_y + y, window_.origin_z + z});
   return blocks;
 }

@@ -12,14 +12,14 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kGathered = 1 << 14;   // pages brought to the host at a time
-constexpr std::size_t kSpare = 16;           // one page of so many is allocated ahead; on a CPU as many as there are, which cost
-                                             // nothing, or a page of the system, until they are touched
-constexpr std::size_t kFewToSort = 1 << 14;  // new surfels; on a CPU, where launches take longer
+constexpr std::size_t kGathered = 1 << 14;        // pages that are copied to the host at a time
+constexpr std::size_t kSpare = 16;                // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
+                                                  // costs nothing there until it is touched
+constexpr std::size_t kMaxSortedAlone = 1 << 14;  // surfels that one work item sorts faster than several launches do, on PoCL
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
-/// Voxel at the far end [m], and some more.
+/// Size of the voxels at the grid's far end, with a margin of 20 % [m].
 double coarsest_voxel(const Grid& grid) { return 1.2 * grid.z_max / grid.f; }
 
 /// Radius of the largest surfels that a view creates [m].
@@ -54,7 +54,7 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
   grow(1024);
 }
 
-/// Pages without surfels have neither bits in `alive` nor in `changed`, those that are not in use either.
+/// Makes room for pages. New ones have no bits in `alive` and `changed`, like all pages without surfels.
 void SurfelMap::grow(std::size_t pages) {
   const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
   const auto grow_marks = [&](DeviceArray<cl_ulong>& marks) {
@@ -68,7 +68,7 @@ void SurfelMap::grow(std::size_t pages) {
   page_block_.grow(pages, kept, spare);
 }
 
-/// How far from the grid a surfel may be that matters to it [m].
+/// Largest distance from the grid at which a surfel still matters to it [m].
 double SurfelMap::window_margin(const Grid& grid) const {
   const double voxel = coarsest_voxel(grid), largest = std::max(largest_radius_, largest_created(grid));
   const double slope =
@@ -78,8 +78,8 @@ double SurfelMap::window_margin(const Grid& grid) const {
 
 double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const {
   const double margin = window_margin(grid);
-  const MapWindow window(grid, T_world_camera, block_size_, margin, {});  // refuses what is absurd
-  return grid_reach(grid) + margin + 2 * block_size_;                     // whole blocks; to the centre; and half a block of motion
+  const MapWindow window(grid, T_world_camera, block_size_, margin, {});  // throws if the grid is far too large
+  return grid_reach(grid) + margin + 2 * block_size_;  // 1 block for rounding to whole ones, 1/2 for a centre, 1/2 for the motion
 }
 
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
@@ -94,7 +94,7 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   list_window();
 }
 
-/// The window's pages by cell.
+/// Lists the window's pages, sorted by cell.
 void SurfelMap::list_window() {
   std::vector<Page> pages;
   std::vector<cl_uint> page_cells, cell_pages = {0};
@@ -111,7 +111,7 @@ void SurfelMap::list_window() {
 }
 
 void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks) {
-  close_window();  // nothing is listed if the list cannot be sent
+  close_window();  // stays closed if the lists cannot be sent
   pages_list_.send(pages);
   page_cells_list_.send(page_cells);
   new_ranks_list_.send(new_ranks);
@@ -120,7 +120,7 @@ void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_ce
   new_ranks_ = std::move(new_ranks);
 }
 
-/// What a frame has failed to finish can no longer be finished: the pages may mean something else from now on.
+/// Forgets the window's pages. A frame that failed halfway cannot be finished later, because its pages may change their blocks.
 void SurfelMap::close_window() {
   window_pages_.clear();
   page_cells_.clear();
@@ -133,7 +133,7 @@ std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& li
   const std::vector<BlockKey> around = window_.blocks_near(distance, index_.blocks().size());
   for (const BlockKey& block : around)
     if (const BlockIndex::Pages* pages = index_.find(block)) add(*pages);
-  if (around.empty()) {  // the map has fewer blocks than there are around
+  if (around.empty()) {  // the map has fewer blocks than lie around the window
     for (const auto& [block, pages] : index_.blocks())
       if (window_.is_near(block, distance)) add(pages);
   }
@@ -148,13 +148,13 @@ void SurfelMap::reserve(std::size_t additional) {
 
 void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
   if (count == 0) return;
-  if (!new_ranks_.empty()) list_window();  // what was inserted before has added pages
+  if (!new_ranks_.empty()) list_window();  // an earlier insertion has added pages, which are not sorted by cell yet
   const auto cell_count = static_cast<cl_uint>(window_.cells());
   free_before_.resize(window_pages() + 1);
   cell_begin_.resize(cell_count + 1);
   missing_.resize(cell_count);
   order_.resize(count);
-  if (commands_.device().prefers_one_item && count <= kFewToSort)
+  if (commands_.device().prefers_one_item && count <= kMaxSortedAlone)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
                   alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else
@@ -182,7 +182,7 @@ void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cell
   commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), count, histogram_(), order_());
 }
 
-/// Adds pages to the window, behind those that it has. @param missing  pages that each cell's block needs
+/// Appends new pages to the window. @param missing  number of new pages for each cell
 void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
   std::vector<Page> pages = window_pages_;
@@ -242,7 +242,7 @@ Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::u
   return surfel;
 }
 
-/// Brings pages to the host, some at a time.
+/// Copies pages to the host, kGathered at a time, and calls the visitor for each.
 void SurfelMap::visit(const std::vector<Page>& pages, const PageVisitor& visitor) const {
   const auto alive = alive_.read(index_.end());
   const auto blocks = page_block_.read(index_.end());
@@ -291,7 +291,8 @@ std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_byte
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;
-  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);  // `alive` and `changed` are cleared as a whole
+  // Without `alive` and `changed`: these are filled with zeros, hence touched.
+  constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);
   return surfels_.bytes() + page_block_.bytes() - kPage * index_.end();
 }
 

@@ -1,4 +1,5 @@
-/// The map: world blocks of pages of surfels in device buffers (kernels/common/surfels.cl says how). A surfel's slot is its id.
+/// The map in device buffers: the world has blocks, a block has pages, a page has PAGE_SLOTS slots for surfels. A surfel's slot is its id.
+/// kernels/common/surfels.cl describes the buffers.
 #pragma once
 
 #include <cstdint>
@@ -21,53 +22,55 @@ class SurfelMap {
   SurfelMap(Commands& commands, Lists& lists, const Config& config);
 
   std::size_t size() const { return size_; }
-  std::size_t bytes() const;            ///< of all that holds surfels, or says where they are, on the device and on the host
-  std::size_t untouched_bytes() const;  ///< of buffers on a CPU, which the operating system has not given yet
+  std::size_t bytes() const;            ///< memory of the surfels and of their index, on the device and on the host
+  std::size_t untouched_bytes() const;  ///< part of the buffers on a CPU that the operating system has not backed with memory yet
 
-  /// @name A frame. Kernels work on the pages of the window, and mark in `alive` and `changed` what they remove and change.
+  /// @name A frame. Kernels work on the pages of the window. They clear the bits of removed surfels in `alive`, and set those of removed,
+  /// new and changed ones in `changed`.
   /// @{
 
-  /// Chooses the blocks that surfels of this view may be in.
+  /// Opens the window of a view: the blocks whose surfels may be in view.
   void open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera);
 
   const MapWindow& window() const { return window_; }
   std::size_t window_pages() const { return window_pages_.size(); }
   const cl::Buffer& pages() const { return pages_list_(); }
 
-  /// Lists the pages within a distance [m] of the window, for compute_known_hull. @return how many
+  /// Lists the pages of all blocks within a distance [m] of the window. @return number of pages
   std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
 
-  /// Makes room for `additional` more surfels of this window.
+  /// Makes room for `additional` more surfels in this window.
   void reserve(std::size_t additional);
 
-  /// Puts surfels into the map. @param cells  of the window, for each surfel
+  /// Puts surfels into the map. @param cells  each surfel's cell of the window
   void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count);
 
-  /// Accounts for surfels that a kernel has removed.
+  /// Subtracts surfels that a kernel has removed from size().
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Notes which pages the frame has changed, and frees empty ones. @return blocks that have lost some, or all
+  /// Marks the pages that changed as changed in this frame, and frees the empty ones. @return block of each freed page
   std::vector<BlockKey> finish_frame(const char* stage, std::uint32_t frame);
 
-  /// What the last frame has changed. Only until the next one begins.
+  /// Changes of the last frame; available until the next one begins.
   Changes last_changes();
   /// @}
 
-  /// All surfels by slot.
+  /// All surfels, ordered by slot.
   std::vector<Surfel> download() const;
 
-  /// Surfels of all pages changed after frame `since`, changed or not, and slots there that hold none.
+  /// Content of the pages that changed after frame `since`: all their surfels as updated, all their empty slots as removed.
   Changes changes(std::uint64_t since) const;
 
-  /// Replaces everything, as frame `frame`. Gives every block pages in the order in which its surfels come. @return slot of each surfel
+  /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
-  /// @name Whole blocks, for the archive: between frames. The last frame's window is closed when one comes or goes.
+  /// @name Whole blocks, for the archive. Called between frames; adding or dropping a block closes the last frame's window.
   /// @{
   double block_size() const { return block_size_; }  ///< [m]
 
-  /// Largest distance along an axis between the camera, moved by half a block at most, and the centre of a block of its window [m].
-  /// @throws BadFrame  the grid is absurdly large for its range
+  /// Largest distance along any axis between the camera and the centre of a block of its window [m]; true also after the camera has moved
+  /// by half a block.
+  /// @throws BadFrame  the grid is far too large for its range
   double window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const;
 
   const BlockIndex& index() const { return index_; }
@@ -99,23 +102,23 @@ class SurfelMap {
   Commands& commands_;
   Lists& lists_;
   const double block_size_;  ///< [m]
-  double largest_radius_;    ///< of all surfels that have ever been in the map [m]
+  double largest_radius_;    ///< no surfel of the map is larger [m]
   const double thickness_;   ///< [voxel]
   std::size_t size_ = 0;
   BlockIndex index_;
 
-  // By slot or page
+  // Indexed by slot or page
   DeviceArray<cl_uint4> surfels_;
   DeviceArray<cl_ulong> alive_, changed_;
   DeviceArray<cl_int4> page_block_;
 
-  // This frame's window: pages by cell
+  // This frame's window: its pages, sorted by cell
   MapWindow window_;
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_;  ///< cell of each page
-  std::vector<bool> listed_cells_;   ///< whose blocks have pages, and meet the grid or have got some in this frame
-  std::vector<cl_uint> new_ranks_;   ///< of pages that insert() has added behind the others: the how many-th of its cell's each is
-  /// The same for the kernels, and where each cell's pages begin, and where the last ends.
+  std::vector<bool> listed_cells_;   ///< cells with listed pages: their block meets the grid, or got pages in this frame
+  std::vector<cl_uint> new_ranks_;   ///< rank of each added page within its cell; insert() appends added pages behind the sorted ones
+  /// The same on the device. cell_pages_list_: index of the first page of each cell, then the number of pages.
   SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_, new_ranks_list_;
 
   // Insertion

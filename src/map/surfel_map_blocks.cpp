@@ -1,4 +1,4 @@
-/// The map's blocks between frames: replaced as a whole, and taken out and in for the archive.
+/// Work on whole blocks between frames: replacing all of them, and moving single ones to and from the archive.
 #include <algorithm>
 #include <utility>
 
@@ -10,52 +10,61 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr float kFarthest = 1e6F;     // [m]; blocks are counted in 32 bits, and floats have 24
-constexpr double kLargestRadius = 4;  // [block]; the window, around all that surfels may reach, must not become large without end
+constexpr float kFarthest = 1e6F;     // [m]; block numbers have 32 bits, and floats are far coarser than the map there
+constexpr double kLargestRadius = 4;  // [block]; the window covers the reach of the largest surfel, so that must be bounded
 
-}  // namespace
-
-std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
+/// Surfels packed into new pages, as the map's buffers hold them.
+struct PackedMap {
   BlockIndex index;
-  std::vector<cl_uint4> packed;
-  std::vector<cl_ulong> alive;
-  std::vector<cl_int4> blocks;
-  std::vector<std::uint32_t> slots;
-  double largest = 0;
-  for (const Surfel& surfel : surfels) {
-    if (!(surfel.position.array().abs() < kFarthest).all())  // nor is it a number
-      throw Error("A surfel lies more than 1000 km from the world's origin: this is no map of a robot's surroundings.");
-    const BlockKey block = block_of(surfel.position, block_size_);
+  std::vector<cl_uint4> surfels;  ///< [PAGE_SLOTS * pages]
+  std::vector<cl_ulong> alive;    ///< [pages]
+  std::vector<cl_int4> page_block;
+  double largest_radius = 0;  ///< [m]
+
+  /// @return slot of the surfel
+  std::uint32_t add(const Surfel& surfel, double block_size, std::uint32_t frame) {
+    const BlockKey block = block_of(surfel.position, block_size);
     const BlockIndex::Pages* pages = index.find(block);
     if (pages == nullptr || alive[pages->back()] == ~cl_ulong{0}) {
       index.add_page(block);
       pages = index.find(block);
       alive.push_back(0);
-      packed.resize(PAGE_SLOTS * alive.size());
-      blocks.push_back({{block.x, block.y, block.z, static_cast<cl_int>(frame)}});
+      surfels.resize(PAGE_SLOTS * alive.size());
+      page_block.push_back({{block.x, block.y, block.z, static_cast<cl_int>(frame)}});
     }
-    const Page page = pages->back();
-    const auto n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page]));
+    const std::uint32_t page = pages->back(), n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page])), slot = PAGE_SLOTS * page + n;
     alive[page] |= cl_ulong{1} << n;
-    slots.push_back(PAGE_SLOTS * page + n);
     Surfel kept = surfel;
-    kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size_));
-    packed[slots.back()] = pack(kept, block, block_size_);
-    largest = std::max<double>(largest, kept.radius);
+    kept.radius = std::min(surfel.radius, static_cast<float>(kLargestRadius * block_size));
+    surfels[slot] = pack(kept, block, block_size);
+    largest_radius = std::max<double>(largest_radius, kept.radius);
+    return slot;
   }
-  grow(std::max(alive.size(), index_.end()));
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
+  PackedMap packed;
+  std::vector<std::uint32_t> slots;
+  for (const Surfel& surfel : surfels) {
+    if (!(surfel.position.array().abs() < kFarthest).all())  // true for NaN as well
+      throw Error("A surfel's position is not finite or more than 1000 km from the world's origin: give positions in metres.");
+    slots.push_back(packed.add(surfel, block_size_, frame));
+  }
+  grow(std::max(packed.alive.size(), index_.end()));
   close_window();
-  // What was there is noted as changed as well.
+  // The pages of the old map count as changed, so that changes() reports their surfels as removed.
   const std::size_t before = index_.end();
-  index.skip_to(before);
-  for (; alive.size() < before; blocks.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) alive.push_back(0);
-  surfels_.write(packed);
-  alive_.write(alive);
-  changed_.write(std::vector<cl_ulong>(alive.size(), 0));  // a frame that failed may have left something there
-  page_block_.write(blocks);
-  index_ = std::move(index);
+  packed.index.skip_to(before);
+  for (; packed.alive.size() < before; packed.page_block.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) packed.alive.push_back(0);
+  surfels_.write(packed.surfels);
+  alive_.write(packed.alive);
+  changed_.write(std::vector<cl_ulong>(packed.alive.size(), 0));  // a failed frame may have left bits
+  page_block_.write(packed.page_block);
+  index_ = std::move(packed.index);
   size_ = surfels.size();
-  largest_radius_ = largest;
+  largest_radius_ = packed.largest_radius;
   return slots;
 }
 
@@ -73,7 +82,7 @@ std::vector<BlockKey> SurfelMap::blocks_changed_since(std::uint32_t frame) const
 std::vector<StoredBlock> SurfelMap::read_blocks(const std::vector<BlockKey>& blocks) const {
   std::vector<StoredBlock> stored;
   std::vector<Page> pages;
-  std::vector<std::size_t> owners;  // of the pages
+  std::vector<std::size_t> owners;  // index in `stored` for each page
   for (const BlockKey& block : blocks) {
     const BlockIndex::Pages* some = index_.find(block);
     if (some != nullptr) {

@@ -9,8 +9,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr double kSteps = 65536;  // of a position in its block
-constexpr float kNormal = 32767;  // steps of a normal's coordinate from 0 to 1
+constexpr double kSteps = 65536;  // steps of a coordinate across a block
+constexpr float kNormal = 32767;  // steps of a normal's octahedral coordinate from 0 to 1
 
 std::uint32_t pack_coordinate(float position, std::int32_t block, double block_size) {
   return static_cast<std::uint32_t>(std::clamp((position / block_size - block) * kSteps, 0.0, kSteps - 1));
@@ -20,6 +20,7 @@ float unpack_coordinate(std::uint32_t steps, std::int32_t block, double block_si
   return static_cast<float>((block + (steps + 0.5) / kSteps) * block_size);
 }
 
+/// Octahedral coordinate p of a normal in the lower half space, folded outwards.
 float fold(float p, float q) { return p < 0 ? std::abs(q) - 1 : 1 - std::abs(q); }
 
 std::uint32_t pack_normal(const Eigen::Vector3f& normal) {
@@ -31,7 +32,7 @@ std::uint32_t pack_normal(const Eigen::Vector3f& normal) {
 
 Eigen::Vector3f unpack_normal(std::uint32_t bits) {
   const auto coordinate = [](std::uint32_t steps) { return static_cast<float>(static_cast<std::int16_t>(steps & 0xffff)); };
-  Eigen::Vector3f n(coordinate(bits), coordinate(bits >> 16), 0);  // whole numbers: exact until it is normalised
+  Eigen::Vector3f n(coordinate(bits), coordinate(bits >> 16), 0);  // whole numbers, exact until normalized()
   n.z() = kNormal - std::abs(n.x()) - std::abs(n.y());
   const float over = std::max(-n.z(), 0.0F);
   n.x() += n.x() < 0 ? over : -over;
@@ -69,7 +70,8 @@ Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) 
 }
 
 std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes) {
-  if (bytes.size() % sizeof(cl_uint4) != 0) throw FileError("A block in the map folder is not whole: the folder is damaged.");
+  if (bytes.size() % sizeof(cl_uint4) != 0)
+    throw FileError("A block in the map folder is incomplete: the folder is damaged; use a backup or another folder.");
   std::vector<cl_uint4> surfels(bytes.size() / sizeof(cl_uint4));
   if (!bytes.empty()) std::memcpy(surfels.data(), bytes.data(), bytes.size());
   return surfels;

@@ -1,4 +1,4 @@
-/// A surfel in 16 bytes, as kernels/common/surfels.cl packs it.
+/// Packs a surfel into 16 bytes, in the format of kernels/common/surfels.cl.
 #pragma once
 
 #include <vector>
@@ -9,14 +9,14 @@
 
 namespace frontier_surfels {
 
-/// Block of a position in the world [m].
+/// Block that contains a position. @param position  world frame [m];  block_size  [m]
 BlockKey block_of(const Eigen::Vector3f& position, double block_size);
 
 cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size);
 
 Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size);
 
-/// The surfels of a block one after the other, 16 bytes each. @throws FileError  they are not whole
+/// Surfels of a block from bytes, 16 for each. @throws FileError  the number of bytes is no multiple of 16
 std::vector<Surfel> unpack_block(const std::vector<std::uint8_t>& bytes, const BlockKey& block, double block_size);
 std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes);
 

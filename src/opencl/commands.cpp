@@ -12,21 +12,21 @@
 namespace frontier_surfels {
 namespace {
 
-/// All kernel files as one source; compiler messages name the file and its own lines.
+/// All kernel files as one source. The compiler's messages name the file and its line.
 std::string source() {
   std::string text;
   for (const auto& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
   return text;
 }
 
-constexpr std::size_t kHugePage = 2 << 20;  // of the usual processors
+constexpr std::size_t kHugePage = 2 << 20;  // [byte], on most processors
 
-/// Memory of the host as a buffer: a CPU works on it in place, and finds its way in few large pages sooner than in many small ones.
+/// A buffer in host memory, where a CPU works in place. Large pages make its memory accesses faster.
 cl::Buffer allocate_on_host(const cl::Context& context, std::size_t bytes) {
   const std::size_t whole = (bytes + kHugePage - 1) / kHugePage * kHugePage;
   std::unique_ptr<void, decltype(&std::free)> memory(std::aligned_alloc(kHugePage, whole), &std::free);
   if (memory == nullptr) throw cl::Error(CL_MEM_OBJECT_ALLOCATION_FAILURE, "aligned_alloc");
-  madvise(memory.get(), whole, MADV_HUGEPAGE);  // advice only: nothing is lost where it is not taken
+  madvise(memory.get(), whole, MADV_HUGEPAGE);  // only advice: it may fail
   cl::Buffer buffer(context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes, memory.get());
   buffer.setDestructorCallback([](cl_mem, void* own) { std::free(own); }, memory.get());
   memory.release();
@@ -45,11 +45,11 @@ cl::Program build(const Device& device) {
   return program;
 }
 
-/// PoCL's threads may still be letting go of the last command when finish() returns, and look into its queue for that: queues, which are
-/// small, are kept for as long as the process lives.
+/// Keeps a queue, which is small, for as long as the process lives: PoCL's threads may still use it to release the last command after
+/// finish() has returned.
 void retire(const cl::CommandQueue& queue, const Device& device) {
   static std::mutex mutex;
-  static auto* const retired = new std::vector<std::pair<cl::CommandQueue, Device>>;  // drivers may be gone before it could be destroyed
+  static auto* const retired = new std::vector<std::pair<cl::CommandQueue, Device>>;  // not destroyed: drivers may be unloaded earlier
   const std::lock_guard<std::mutex> lock(mutex);
   retired->emplace_back(queue, device);
 }
@@ -64,7 +64,7 @@ std::string build_options(const Device& device) {
 Commands::Commands(Device device) : device_(std::move(device)) {
   try {
     queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
-    most_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+    max_buffer_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     std::vector<cl::Kernel> kernels;
     build(device_).createKernels(&kernels);
     for (const auto& kernel : kernels) kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
@@ -75,9 +75,9 @@ Commands::Commands(Device device) : device_(std::move(device)) {
 
 Commands::~Commands() {
   try {
-    finish();  // a frame that failed may still be reading what is kept
+    finish();  // commands of a failed frame may still read the kept values
   } catch (const cl::Error&) {
-    // The device is lost: nothing reads any more.
+    // The device is lost, so no command reads them any more.
   }
   retire(queue_, device_);
 }
@@ -105,9 +105,9 @@ std::vector<StageTime> Commands::take_times() {
 }
 
 cl::Buffer Commands::allocate(std::size_t bytes) {
-  if (bytes > most_bytes_)
+  if (bytes > max_buffer_bytes_)
     throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
-                      std::to_string(most_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
+                      std::to_string(max_buffer_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
   cl::Buffer buffer = device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
                                                                : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
   allocated_bytes_ += bytes;

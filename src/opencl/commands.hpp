@@ -1,4 +1,4 @@
-/// The program, its queue, buffers that grow, and the time that each stage took.
+/// Kernel launches with the device time of each stage, and device buffers that grow.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 
 namespace frontier_surfels {
 
-/// Options that the kernels are built with for a device.
+/// Options with which the kernels are built for a device.
 std::string build_options(const Device& device);
 
-/// Builds all kernels once; launches them by name and notes their times.
+/// Builds all kernels once, launches them by name and records their times.
 class Commands {
  public:
   explicit Commands(Device device);
@@ -25,11 +25,11 @@ class Commands {
   Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
-  std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< that a work item handles
-  std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< of LANES that `count` entries make
+  std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
+  std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
   cl::CommandQueue& queue() { return queue_; }
 
-  /// Launches a kernel over at least `items` work items, in groups of `group`, and counts its time to `stage`.
+  /// Launches a kernel with at least `items` work items in groups of `group`. Its device time counts towards `stage`.
   template <typename... Args>
   void run(const char* stage, const char* kernel, std::size_t items, std::size_t group, const Args&... args) {
     if (items == 0) return;
@@ -42,36 +42,38 @@ class Commands {
     note(stage, functor(cl::EnqueueArgs(queue_, global, local), args...));
   }
 
-  void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }
+  void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }  ///< counts its time towards `stage`
 
-  /// Waits for all launches, and forgets what was kept for them. Device time of each stage since the last call, in the order of their
-  /// first launch.
+  /// Waits for all launches and releases the values kept for them.
+  /// @return device time of each stage since the last call, in the order of their first launch
   std::vector<StageTime> take_times();
 
-  /// The same without the times.
+  /// As take_times(), but drops the times.
   void forget_times();
 
-  /// Keeps what a command reads from until take_times() or forget_times().
+  /// Keeps values that a command reads alive until take_times() or forget_times().
   void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
-  std::size_t most_bytes() const { return most_bytes_; }  ///< that a buffer may have
+  std::size_t max_buffer_bytes() const { return max_buffer_bytes_; }  ///< limit of the device for one buffer
   cl::Buffer allocate(std::size_t bytes);
+
+  /// Count memory that the caller has allocated without allocate(), or has released.
   void allocated(std::size_t bytes) { allocated_bytes_ += bytes; }
   void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
   std::size_t allocated_bytes() const { return allocated_bytes_; }
 
  private:
-  void finish();  ///< waits for all launches, and drops what was kept for them
+  void finish();  ///< waits for all launches and releases the values kept for them
 
   Device device_;
   cl::CommandQueue queue_;
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
-  std::size_t allocated_bytes_ = 0, most_bytes_ = 0;
+  std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0;
 };
 
-/// A buffer of T that only ever grows.
+/// A device buffer of T that grows and never shrinks.
 template <typename T>
 class DeviceArray {
  public:
@@ -80,16 +82,16 @@ class DeviceArray {
   DeviceArray(const DeviceArray&) = delete;
   DeviceArray& operator=(const DeviceArray&) = delete;
 
-  /// Makes room for `size` elements, with some to spare; what it held is lost if it grows.
+  /// Makes room for `size` elements and some more. The contents are lost if the buffer grows.
   void resize(std::size_t size) { grow(size, 0); }
 
-  /// The same for a size that stays: nothing to spare.
+  /// As resize(), without more room than needed: for sizes that do not change.
   void allocate(std::size_t size) { grow(size, 0, size + 1); }
 
-  /// Makes room for `size` elements, with one of `spare` ahead, and keeps the first `kept`.
+  /// Makes room for `size` elements and size / spare more. Keeps the first `kept` elements.
   void grow(std::size_t size, std::size_t kept, std::size_t spare = 4) {
     if (size <= capacity_) return;
-    const std::size_t larger = std::max(size, std::min(size + size / spare, commands_->most_bytes() / sizeof(T)));
+    const std::size_t larger = std::max(size, std::min(size + size / spare, commands_->max_buffer_bytes() / sizeof(T)));
     const cl::Buffer bigger = commands_->allocate(larger * sizeof(T));
     if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
     commands_->release(capacity_ * sizeof(T));
@@ -97,7 +99,7 @@ class DeviceArray {
     capacity_ = larger;
   }
 
-  /// Replaces rows of `old_width` elements by `rows` of `width`, nothing to spare. The first `kept` rows keep what they hold.
+  /// Replaces rows of `old_width` elements by `rows` rows of `width` elements. The first `kept` rows keep their contents.
   void widen_rows(std::size_t rows, std::size_t kept, std::size_t old_width, std::size_t width) {
     const cl::Buffer bigger = commands_->allocate(rows * width * sizeof(T));
     if (kept > 0 && old_width > 0)
@@ -108,13 +110,14 @@ class DeviceArray {
     capacity_ = rows * width;
   }
 
+  /// Writes values from element `offset` on, growing if needed. Elements before `offset` stay.
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
     commands_->queue().enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
   }
 
-  /// The same without waiting for it, nor for what is running.
+  /// As write(), but does not wait for the device.
   void send(std::vector<T> values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
@@ -147,8 +150,8 @@ class DeviceArray {
   std::size_t capacity_ = 0;
 };
 
-/// Values of T that the host gives anew with every frame, for kernels to read. A device that shares the host's memory reads them where they
-/// are: that saves a command, which costs more than what is copied.
+/// Values of T that the host sends in every frame for kernels to read. A device that shares the host's memory reads them in place: a copy
+/// command would cost more than the copying.
 template <typename T>
 class SentArray {
  public:
@@ -158,11 +161,11 @@ class SentArray {
   SentArray& operator=(const SentArray&) = delete;
 
   void send(std::vector<T> values) {
-    if (values.empty()) values.resize(1);  // there are no empty buffers
+    if (values.empty()) values.resize(1);  // OpenCL has no empty buffers
     if (!commands_->device().shares_memory) return array_.send(std::move(values));
     auto shared = std::make_shared<std::vector<T>>(std::move(values));
     commands_->keep(shared);
-    commands_->keep(shared_);  // what runs may still read what was sent before
+    commands_->keep(shared_);  // running kernels may still read the values sent before
     buffer_ = cl::Buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, shared->size() * sizeof(T), shared->data());
     commands_->release(shared_bytes());
     shared_ = std::move(shared);
@@ -175,9 +178,9 @@ class SentArray {
   std::size_t shared_bytes() const { return shared_ == nullptr ? 0 : shared_->size() * sizeof(T); }
 
   Commands* commands_;
-  DeviceArray<T> array_;  ///< of a device with a memory of its own
-  std::shared_ptr<const std::vector<T>> shared_;
-  cl::Buffer buffer_;  ///< of what it shares
+  DeviceArray<T> array_;                          ///< used on devices with memory of their own
+  std::shared_ptr<const std::vector<T>> shared_;  ///< used on devices that share the host's memory
+  cl::Buffer buffer_;                             ///< buffer over shared_
 };
 
 }  // namespace frontier_surfels

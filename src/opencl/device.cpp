@@ -34,14 +34,14 @@ std::vector<Candidate> all_devices() {
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);
-  } catch (const cl::Error&) {  // the loader's way to say that there is none
+  } catch (const cl::Error&) {  // thrown if there is no platform
   }
   std::vector<Candidate> found;
   for (const auto& platform : platforms) {
     std::vector<cl::Device> devices;
     try {
       platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
-    } catch (const cl::Error&) {  // a platform without devices
+    } catch (const cl::Error&) {  // thrown if the platform has no devices
     }
     for (const auto& device : devices) found.push_back({platform.getInfo<CL_PLATFORM_NAME>(), device});
   }
@@ -58,12 +58,13 @@ std::string describe(const Candidate& candidate) {
 
 std::string listing(const std::vector<Candidate>& candidates) {
   if (candidates.empty()) return " There is no OpenCL device at all: install a driver, or pocl-opencl-icd to use the CPU.";
-  std::string text = " There are:";
+  std::string text = " Available devices:";
   for (const auto& candidate : candidates) text += "\n  " + describe(candidate);
   return text;
 }
 
-/// Part of a device that can be divided; the whole of one that cannot.
+/// A part of the device with `threads` compute units; the whole device if `threads` is 0 or it has no more.
+/// @throws DeviceError  the device cannot be divided
 cl::Device limit_threads(const cl::Device& device, int threads) {
   if (threads == 0 || threads >= static_cast<int>(device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>())) return device;
   const cl_device_partition_property by_counts[] = {CL_DEVICE_PARTITION_BY_COUNTS, threads, CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};

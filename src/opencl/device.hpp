@@ -11,17 +11,17 @@ struct Device {
   cl::Context context;
   bool is_cpu = false;
   int lanes = 1;                  ///< points that one work item handles at once: 16 or 1
-  bool prefers_one_item = false;  ///< a small job is done by one work item alone: PoCL takes longer for a launch; llvmpipe cannot, it ends
-                                  ///< loops after 65535 turns
-  bool shares_memory = false;     ///< with the host
+  bool prefers_one_item = false;  ///< one work item does small jobs alone, because a launch costs more on PoCL; not on llvmpipe, which
+                                  ///< ends loops after 65535 turns
+  bool shares_memory = false;     ///< the device works in the host's memory
   std::string description;        ///< platform, name and compute units
 
-  /// Work items of a group where each has much to do: a CPU runs the items of a group one after the other, and waits for the last.
+  /// Group size for kernels with much work per item. 1 on a CPU: it runs the items of a group one after the other on one core.
   std::size_t heavy_group() const { return is_cpu ? 1 : 64; }
 };
 
-/// The device that platform, device_type, device_index and threads ask for, and how many lanes its work items have.
-/// @throws DeviceError with a list of all devices if there is none, or if it lacks what the kernels need
+/// Chooses the device by platform, device_type, device_index and threads of the configuration, and the lanes of its work items.
+/// @throws DeviceError  no device fits (the message lists all devices), or the device lacks something that the kernels need
 Device choose_device(const Config& config);
 
 }  // namespace frontier_surfels

@@ -11,7 +11,7 @@ struct KernelFile {
   std::string text;
 };
 
-/// All files of kernels/, in their order.
+/// All files of kernels/, in the order in which they are compiled.
 const std::vector<KernelFile>& kernel_files();
 
 }  // namespace frontier_surfels

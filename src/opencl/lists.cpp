@@ -6,15 +6,16 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kFew = 2048, kFewOfCpu = 65536;  // one more launch would take longer
-constexpr std::size_t kFewWords = 1 << 18;             // on a CPU: two more
-constexpr std::size_t kRoom = 1 << 14;
+// Below these sizes one work item alone is faster than one more launch, or for words two more.
+constexpr std::size_t kMaxScannedAlone = 2048, kMaxScannedAloneOnPocl = 65536;  // values
+constexpr std::size_t kMaxListedAlone = 1 << 18;                                // words, on PoCL
+constexpr std::size_t kInitialRoom = 1 << 14;                                   // elements of a list
 
 }  // namespace
 
 Lists::Lists(Commands& commands)
     : commands_(commands),
-      few_(commands.device().prefers_one_item ? kFewOfCpu : kFew),
+      max_scanned_alone_(commands.device().prefers_one_item ? kMaxScannedAloneOnPocl : kMaxScannedAlone),
       counts_(commands),
       levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
               DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
@@ -27,7 +28,7 @@ std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::
 
 void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
-  if (count <= few_) {
+  if (count <= max_scanned_alone_) {
     commands_.run(stage, "scan_few", 1, 1, values(), n);
     return;
   }
@@ -43,7 +44,7 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
   if (count == 0) return 0;
   const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
   const auto words = static_cast<cl_uint>(count);
-  if (commands_.device().prefers_one_item && count <= kFewWords) return list_few_bits(stage, bits, words, list);
+  if (commands_.device().prefers_one_item && count <= kMaxListedAlone) return list_few_bits(stage, bits, words, list);
   counts_.resize(chunks + 1);
   commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
   const std::uint32_t total = scan(stage, counts_, chunks);
@@ -52,9 +53,9 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
   return total;
 }
 
-/// The list's room is what earlier ones have needed; when it is not enough, all is done again.
+/// Lists into the room that the list has from earlier calls. If that is too small, enlarges it and lists again.
 std::uint32_t Lists::list_few_bits(const char* stage, const DeviceArray<cl_ulong>& bits, cl_uint words, DeviceArray<cl_uint>& list) {
-  list.resize(kRoom);
+  list.resize(kInitialRoom);
   counts_.resize(1);
   for (;;) {
     const std::size_t room = list.bytes() / sizeof(cl_uint);

@@ -1,4 +1,4 @@
-/// Lists in a fixed order from bits and counts on the device, the same on any number of threads.
+/// Prefix sums and lists of set bits on the device. The results do not depend on the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ class Lists {
  public:
   explicit Lists(Commands& commands);
 
-  /// Replaces values by the sums of all before them. @param values  `count` of them and room for one more: the total
+  /// Replaces each value by the sum of all values before it. @param values  `count` values, and room for one more: the total
   void prefix_sums(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
     if (count > 0) scan_level(stage, values, count, 0);
   }
 
-  /// The same. @return the total
+  /// As prefix_sums(), and reads the total. @return the total
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
 
-  /// The numbers 64 n + bit of set bits, ascending. @param count  words. @return how many
+  /// Lists the set bits of `count` words, ascending, each as 64 * word + bit. @return number of set bits
   std::uint32_t list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list);
 
  private:
@@ -27,9 +27,9 @@ class Lists {
   void scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level);
 
   Commands& commands_;
-  std::size_t few_;  ///< so many values one work item scans alone
+  std::size_t max_scanned_alone_;  ///< number of values up to which one work item scans alone
   DeviceArray<cl_uint> counts_;
-  DeviceArray<cl_uint> levels_[5];  ///< sums of chunks, of chunks of chunks, ...
+  DeviceArray<cl_uint> levels_[5];  ///< sums of chunks, sums of chunks of these, and so on
 };
 
 }  // namespace frontier_surfels

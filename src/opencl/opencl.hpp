@@ -1,4 +1,4 @@
-/// Khronos' C++ bindings as this library uses them, and errors as sentences.
+/// Khronos' C++ bindings of OpenCL, and its errors as sentences.
 #pragma once
 
 #include <CL/opencl.hpp>
@@ -8,14 +8,14 @@
 
 namespace frontier_surfels {
 
-/// Name of an OpenCL error code, "error -1234" for one that has none here.
+/// Name of an OpenCL error code; "error -1234" for codes without a name in this function.
 std::string opencl_error_name(cl_int code);
 
-/// The sentence for a failed call.
+/// Error with a sentence that names the failed call and what to do.
 DeviceError device_error(const cl::Error& error);
 
-/// Throws device_error() for an error of OpenCL's, and any other as it is. Call it while the error is being handled.
-/// Takes the base class so that callers need not know of OpenCL.
+/// Throws device_error() for an OpenCL error and rethrows any other error. Call it from a catch block.
+/// Takes the base class, so that callers do not depend on OpenCL.
 [[noreturn]] void throw_device_error(const std::exception& error);
 
 }  // namespace frontier_surfels

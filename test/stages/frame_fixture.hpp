@@ -1,4 +1,4 @@
-/// What a frame has before its stages run: a camera, a map and kept views. Tests make the stages that they need themselves.
+/// What a frame has before its stages run: a camera, a map and kept views. Tests make the stages they need themselves.
 #pragma once
 
 #include "frame/camera.hpp"
@@ -24,7 +24,7 @@ class FrameFixture {
         views_(commands, config),
         cameras_(commands, config),
         access_(commands, map_) {
-    views_.clear(false);  // as if views had been forgotten: the known space must be computed
+    views_.clear(false);  // as if views had been forgotten, so that known space must be computed
   }
 
   /// Begins a frame, as Mapper does.
@@ -52,7 +52,7 @@ class FrameFixture {
 
   using Bits = reference::Field<char>;
 
-  /// @param offset  words before the field
+  /// @param offset  number of words before the field
   Bits read(const BitField& field, std::size_t offset = 0) const {
     return reference::unpack(field.read(words(grid()), offset), grid().size_i, grid().size_j, grid().size_k);
   }
@@ -69,7 +69,7 @@ class FrameFixture {
     candidates.bits().write(words);
   }
 
-  /// Words of candidates, tile by tile, as bits; there are none beyond the grid.
+  /// Bits of candidate words, which are ordered tile by tile. Expects no candidate beyond the grid.
   Bits read_tile_words(const std::vector<std::uint64_t>& tile_words) const {
     std::vector<std::uint64_t> words(frontier_surfels::words(grid()), 0);
     std::size_t bits = 0, bits_inside = 0;
@@ -83,7 +83,7 @@ class FrameFixture {
   }
 
  private:
-  /// Calls visit(number of a word in the order of the other bit fields, its number among the candidates', tile by tile).
+  /// Calls visit(index, tile_index) for every word: its index in ordinary bit fields, and in the candidates' order, tile by tile.
   template <typename Visit>
   void for_each_candidate_word(Visit visit) const {
     const int tiles_i = (grid().size_i + VIEW_TILE - 1) / VIEW_TILE;

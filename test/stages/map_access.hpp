@@ -16,7 +16,7 @@ class MapAccess {
  public:
   MapAccess(Commands& commands, SurfelMap& map) : commands_(commands), map_(map) {}
 
-  /// Takes surfels out of the map, as an earlier frame would have.
+  /// Removes surfels from the map, as an earlier frame would have done.
   void kill(const std::vector<std::uint32_t>& slots) {
     for (const std::uint32_t slot : slots) {
       const auto word = peek<cl_ulong>(map_.alive(), slot / PAGE_SLOTS);
@@ -25,7 +25,7 @@ class MapAccess {
     map_.removed(slots.size());
   }
 
-  /// As if all surfels of the window were new.
+  /// Marks all slots of the window as changed, as if all surfels were new.
   void change_all() {
     for (const std::uint32_t page : window_pages()) poke(map_.changed(), page, ~cl_ulong{0});
   }
@@ -34,7 +34,7 @@ class MapAccess {
     for (const std::uint32_t slot : slots) poke(map_.surfels(), 4 * std::size_t{slot} + 3, cl_uint{attributes(slot) | SURFEL_RAGGED});
   }
 
-  /// Of the first pages: all slots, and the block of each page.
+  /// All slots of the first pages, and the blocks of the first pages.
   std::vector<cl_uint4> packed_of(std::size_t pages) const { return peek_all<cl_uint4>(map_.surfels(), PAGE_SLOTS * pages); }
   std::vector<cl_int4> blocks_of(std::size_t pages) const { return peek_all<cl_int4>(map_.page_block(), pages); }
 
@@ -47,13 +47,13 @@ class MapAccess {
     return {block.s[0], block.s[1], block.s[2]};
   }
 
-  /// The window's pages, as the kernels that go through them number them.
+  /// The window's pages in the order in which kernels number them.
   std::vector<std::uint32_t> window_pages() const { return peek_all<cl_uint>(map_.pages(), map_.window_pages()); }
 
-  /// A word for each of them, a bit a slot.
+  /// One word for each page of the window, one bit for each slot.
   std::vector<std::uint64_t> words(const DeviceArray<cl_ulong>& bits) const { return bits.read(map_.window_pages()); }
 
-  /// Slots that such words say, page after page.
+  /// Slots whose bits are set in such words, page after page.
   std::vector<std::uint32_t> slots(const std::vector<std::uint64_t>& words) const {
     std::vector<std::uint32_t> slots;
     const std::vector<std::uint32_t> pages = window_pages();
@@ -64,9 +64,9 @@ class MapAccess {
   }
   std::vector<std::uint32_t> slots(const DeviceArray<cl_ulong>& bits) const { return slots(words(bits)); }
 
-  /// Where surfels stand in the map, or in the part of it that is in none of the slots `but`. Each must be there once.
+  /// Finds the slots of surfels. Expects that the map's slots, without those in `except`, hold exactly these surfels, each once.
   std::vector<std::uint32_t> find_slots(const std::vector<cl_uint4>& surfels, const std::vector<cl_uint>& cells,
-                                        const std::set<std::uint32_t>& but) const {
+                                        const std::set<std::uint32_t>& except) const {
     std::map<std::array<std::int64_t, 7>, std::uint32_t> slots;
     const auto key = [](const cl_uint4& p, const BlockKey& b) {
       return std::array<std::int64_t, 7>{p.s[0], p.s[1], p.s[2], p.s[3], b.x, b.y, b.z};
@@ -76,12 +76,12 @@ class MapAccess {
     const std::vector<cl_uint4> packed_slots = packed_of(pages);
     const std::vector<cl_int4> blocks = blocks_of(pages);
     for (const Surfel& surfel : all) {
-      if (but.count(surfel.id) != 0) continue;
+      if (except.count(surfel.id) != 0) continue;
       const cl_int4& block = blocks[surfel.id / PAGE_SLOTS];
       EXPECT_TRUE(slots.emplace(key(packed_slots[surfel.id], {block.s[0], block.s[1], block.s[2]}), surfel.id).second)
           << "two surfels are the same";
     }
-    EXPECT_EQ(slots.size(), surfels.size()) << "so many are new";
+    EXPECT_EQ(slots.size(), surfels.size()) << "number of new surfels";
     std::vector<std::uint32_t> found;
     for (std::size_t n = 0; n < surfels.size(); ++n) {
       const auto at = slots.find(key(surfels[n], map_.window().block(static_cast<int>(cells[n]))));

@@ -1,4 +1,4 @@
-/// The fields of the paths of section 3.2 as tests read and write them.
+/// Reading and writing the bit fields of the paths of section 3.2.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@ namespace frontier_surfels {
 
 using Bits = FrameFixture::Bits;
 
-/// Lets section 3.2 work on all paths through the voxels around these candidates, no more.
+/// Restricts section 3.2 to the paths through the voxels around these candidates.
 inline void need_paths_around(const FrameFixture& fixture, const Bits& bits, Candidates& candidates, NeededPaths& needed) {
   fixture.write(candidates, bits);
   needed.mark(fixture.frame(), candidates);
@@ -32,7 +32,7 @@ inline std::vector<Bits> read_paths(const Grid& grid, const NeededPaths& needed)
   return paths;
 }
 
-/// Where a plane of events begins [word]. @param family  0, 1, 2: paths along i, j, k; @param event  EVENT_ENTER_FORWARD and so on
+/// Index of the first word of a plane of events. @param family  0, 1, 2: paths along i, j, k; @param event  EVENT_ENTER_FORWARD and so on
 inline std::size_t event_offset(const Grid& grid, int family, int event) { return (family * EVENT_PLANES + event) * words(grid); }
 
 inline Bits unpack_face(const std::vector<std::uint64_t>& words, int rows, int columns, bool word_each) {

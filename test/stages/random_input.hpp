@@ -1,4 +1,4 @@
-/// Random but valid input for the stages' tests: cameras of awkward sizes, depth images, poses, surfels, bit fields. Fixed seeds.
+/// Random but valid input for the tests of stages, with fixed seeds: cameras of awkward sizes, depth images, poses, surfels, bit fields.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,7 +16,7 @@
 
 namespace frontier_surfels::reference {
 
-/// The slow implementations of OpenCL (interpreters, checkers) get fewer and smaller cases.
+/// Are fewer and smaller cases wanted, for slow implementations of OpenCL (interpreters, checkers)?
 inline bool small_tests() {
   const char* value = std::getenv("FRONTIER_SURFELS_TEST_SMALL");
   return value != nullptr && std::string(value) == "1";
@@ -38,7 +38,7 @@ class Random {
     return v.normalized();
   }
 
-  /// A pose that is off the identity by at most so much.
+  /// A pose that differs from the identity by at most `distance` [m] and `angle` [rad].
   Eigen::Isometry3d pose(double distance, double angle) {
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
     T.translation() = direction() * uniform(0, distance);
@@ -56,13 +56,13 @@ struct CameraSetup {
   Config config;
 };
 
-/// A camera whose grid has exactly `layers` layers: z_max lies a little before the centre of the last one, whatever the focal length.
+/// A camera whose grid has exactly `layers` layers: z_max lies a little in front of the last layer's centre for any focal length.
 inline CameraSetup make_camera(int width, int height, double fx, double fy, int layers, std::array<int, 3> padding = {5, 5, 2}) {
   CameraSetup camera;
   camera.name = std::to_string(width) + " x " + std::to_string(height) + " pixels, " + std::to_string(layers) + " layers";
   camera.intrinsics = {fx, fy, 0.5 * width - 0.43, 0.5 * height - 0.61, width, height};
   camera.config.decimation = 1;
-  camera.config.min_gap = 0;  // only the tests of thin gaps want them closed
+  camera.config.min_gap = 0;  // only the tests of thin gaps set it
   camera.config.padding_i = padding[0];
   camera.config.padding_j = padding[1];
   camera.config.padding_k = padding[2];
@@ -71,7 +71,7 @@ inline CameraSetup make_camera(int width, int height, double fx, double fy, int 
   return camera;
 }
 
-/// Sizes on both sides of the borders of words (64 layers), tiles (8 x 8 x 32 voxels) and work-groups.
+/// Cameras with sizes just below and above whole words (64 layers), tiles (8 x 8 x 32 voxels) and work-groups.
 inline std::vector<CameraSetup> cameras() {
   std::vector<CameraSetup> all = {make_camera(7, 5, 10.3, 12.1, 33), make_camera(1, 1, 11.2, 11.2, 31, {1, 1, 1})};
   if (small_tests()) return all;
@@ -85,7 +85,7 @@ inline std::vector<CameraSetup> cameras() {
 
 enum class Content { mixed, all_valid, all_invalid };
 
-/// Depths between z_min and z_max with, in the mixed ones, holes and rays that met nothing up to z_max (negative).
+/// Depths between z_min and z_max. Mixed images also have holes (0) and rays without a surface up to z_max (negative).
 inline WorkingImage random_image(const CameraSetup& camera, Content content, Random& random) {
   WorkingImage image;
   image.intrinsics = camera.intrinsics;

@@ -1,4 +1,4 @@
-/// Dense fields over the voxels of a grid, one value a voxel: what the references compute with instead of bit fields.
+/// Dense fields with one value per voxel of a grid. The references use them instead of bit fields.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ struct Field {
   const T& operator()(int i, int j, int k) const { return values[(static_cast<std::size_t>(i) * size_j + j) * size_k + k]; }
 };
 
-/// A yes or no that the device, which computes in float, may see either way when it is `open`: the real value lies at the threshold.
+/// A decision. `open`: the exact value is so near the threshold that the device, which computes in float, may decide either way.
 enum class Truth : signed char { no, yes, open };
 
 inline Truth truth(bool value) { return value ? Truth::yes : Truth::no; }
@@ -55,7 +55,7 @@ void for_each_voxel(const SizedT& sized, Visitor&& visit) {
       for (int k = 0; k < sized.size_k; ++k) visit(i, j, k);
 }
 
-/// Bit field of common/grid: word (j words_k + w) size_i + i, bit k % 64 of word k / 64.
+/// Bit field in the layout of common/grid: word (j words_k + w) size_i + i, bit k % 64 of word k / 64.
 template <typename T>
 std::vector<std::uint64_t> pack(const Field<T>& field) {
   const std::size_t words_k = (field.size_k + 63) / 64;
@@ -66,7 +66,7 @@ std::vector<std::uint64_t> pack(const Field<T>& field) {
   return words;
 }
 
-/// The reverse; layers beyond the grid's last are expected to be empty.
+/// The reverse of pack(). Expects no bits beyond the grid's last layer.
 inline Field<char> unpack(const std::vector<std::uint64_t>& words, int size_i, int size_j, int size_k) {
   const int words_k = (size_k + 63) / 64;
   Field<char> field(size_i, size_j, size_k, 0);
@@ -85,7 +85,7 @@ inline Field<char> unpack(const std::vector<std::uint64_t>& words, int size_i, i
   return field;
 }
 
-/// Tally of a comparison: wrong ones fail, open ones may be few.
+/// Counts the results of a comparison. Wrong ones fail; open ones must be few.
 class Comparison {
  public:
   explicit Comparison(std::string what) : what_(std::move(what)) {}
@@ -101,10 +101,10 @@ class Comparison {
     }
   }
 
-  /// Of few things one may be open by chance.
+  /// One open result is always allowed: it may happen by chance in a small comparison.
   ~Comparison() {
-    EXPECT_EQ(wrong_, 0u) << what_ << ": so many of " << all_ << " are wrong";
-    EXPECT_LE(open_, all_ / 100 + 1) << what_ << ": so many of " << all_ << " could not be decided";
+    EXPECT_EQ(wrong_, 0u) << what_ << ": number of wrong ones among " << all_;
+    EXPECT_LE(open_, all_ / 100 + 1) << what_ << ": number of undecided ones among " << all_;
   }
 
  private:

@@ -34,12 +34,12 @@ struct Nuvg {
         size_i(intrinsics.width + 2 * padding_i),
         size_j(intrinsics.height + 2 * padding_j),
         size_k(0) {
-    size_k = static_cast<int>(std::ceil(to_grid({0, 0, config.z_max}).z())) + 1;  // room for a surfel behind any depth
+    size_k = static_cast<int>(std::ceil(to_grid({0, 0, config.z_max}).z())) + 1;  // one layer for surfels behind z_max
   }
 
   double voxel_size(double z) const { return std::max(z, z_min) / f; }
 
-  /// F: camera frame [m] -> grid coordinates. The cuboid's x and y by fx and fy as well, so that F is continuous where they differ.
+  /// F: camera frame [m] -> grid coordinates. The cuboid, too, scales x by fx and y by fy, so that F is continuous if they differ.
   Vector3d to_grid(const Vector3d& p) const {
     if (p.z() < z_min) return {p.x() * camera.fx / z_min + center_i, p.y() * camera.fy / z_min + center_j, p.z() / delta_min + padding_k};
     return {p.x() * camera.fx / p.z() + center_i, p.y() * camera.fy / p.z() + center_j, f * std::log(p.z() / z_min) + k_min};
@@ -63,7 +63,7 @@ struct Nuvg {
   }
 };
 
-/// The voxel around a real grid coordinate; a coordinate within `tolerance` of the border between two voxels is open.
+/// The voxel that contains a grid coordinate; open if the coordinate is within `tolerance` of the border between two voxels.
 struct Voxel {
   Vector3i index;
   bool open;

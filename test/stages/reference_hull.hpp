@@ -1,4 +1,4 @@
-/// Known state hull, cell by cell - supplement C.
+/// Known state hull, computed cell by cell - supplement C.
 #pragma once
 
 #include <cmath>
@@ -27,7 +27,7 @@ class Hull {
     }
   }
 
-  /// [row][1][column]: face i [j][1][k], face j [i][1][k], face k [j][1][i]
+  /// State of each cell, [row][1][column]: [j][1][k] for the i faces, [i][1][k] for the j faces, [j][1][i] for the k faces.
   const Field<Truth>& face(int number) const { return faces_[number]; }
 
  private:
@@ -56,7 +56,7 @@ class Hull {
       }
   }
 
-  /// State of the nearest surfel; an unknown one wins a tie. Open: surfels as near, or that may not be there, say something else.
+  /// State of the nearest surfel that is hit; in a tie unknown wins. Open: surfels that are as near, or may not be hit, say otherwise.
   static Truth nearest(const std::vector<Hit>& hits) {
     double certain = std::numeric_limits<double>::infinity();
     for (const Hit& hit : hits)

@@ -1,4 +1,5 @@
-/// Observed space C~, literally: for every pixel and every layer - paper 3.3, eq. (9)-(11). And what is asked of it beside a voxel.
+/// Observed space C~, computed literally for every pixel and layer - paper 3.3, eq. (9)-(11) -, and questions about a voxel and its
+/// neighbours.
 #pragma once
 
 #include <vector>
@@ -8,7 +9,7 @@
 
 namespace frontier_surfels::reference {
 
-/// @param layer_depth  z of each layer's centre [m], as the device has it: a depth equal to one must be decided exactly
+/// @param layer_depth  z of each layer's centre [m] on the device: a depth equal to one of them must be decided exactly
 inline Field<Truth> observed_space(const Nuvg& grid, const WorkingImage& image, const std::vector<float>& layer_depth) {
   const Intrinsics& camera = grid.camera;
   Field<Truth> observed = grid.field(Truth::no);
@@ -16,13 +17,13 @@ inline Field<Truth> observed_space(const Nuvg& grid, const WorkingImage& image, 
     for (int s = 0; s < camera.width; ++s) {
       const float depth = image.depth[t * camera.width + s];
       if (depth == 0) continue;
-      const double d = std::abs(depth);  // negative: nothing was met up to there
+      const double d = std::abs(depth);  // negative: free space up to there
       for (int k = 0; k < grid.size_k; ++k)
         if (k >= grid.k_min && layer_depth[k] < d) observed(s + grid.padding_i, t + grid.padding_j, k) = Truth::yes;
       for (int k = grid.padding_k; k < grid.k_min && k < grid.size_k; ++k) {
         const double z = (k - grid.padding_k) * grid.delta_min;
         const Vector3d sample(z / camera.fx * (s - camera.cx), z / camera.fy * (t - camera.cy), z);
-        // k is whole by construction; along i and j doubles decide, as they do in the table of footprints.
+        // k is whole by construction. Along i and j doubles decide, as in the grid's tables of pixels.
         Vector3d c = grid.to_grid(sample);
         c.z() = k;
         const Voxel voxel = voxel_of(c, 1e-9);
@@ -43,18 +44,19 @@ inline Field<Truth> observed_space(const Nuvg& grid, const WorkingImage& image, 
   return observed;
 }
 
-/// Does a column of observed voxels end in voxel v at a measured surface, or does a point of v, at depth z, lie in the body behind it?
+/// Does the column of observed voxels end at a measured surface in voxel v, or does a point of v at depth z lie up to surface_depth behind
+/// that surface?
 inline Truth at_surface(const Nuvg& grid, const WorkingImage& image, const std::vector<float>& layer_depth, double surface_depth,
                         const Vector3i& v, double z) {
   const int s = v.x() - grid.padding_i, t = v.y() - grid.padding_j, k = v.z();
   if (s < 0 || t < 0 || s >= grid.camera.width || t >= grid.camera.height || k <= grid.k_min) return Truth::no;
   const double d = image.depth[t * grid.camera.width + s];
-  if (d <= 0) return Truth::no;  // no measurement, or nothing was met
+  if (d <= 0) return Truth::no;  // no measurement, or free space
   const auto observed = [&](int layer) { return layer >= grid.k_min && layer < grid.size_k && layer_depth[layer] < d; };
   return truth(observed(k - 1) && !observed(k)) || (!less(z, d, 1e-5) && !less(d + surface_depth, z, 1e-5));
 }
 
-/// Unit vectors from voxel v to those of the 26 around it that have C~ = 1.
+/// Unit vectors from voxel v to its observed neighbours (C~ = 1) among the 26.
 inline std::vector<Vector3d> directions(const Nuvg& grid, const Field<char>& observed, const Vector3i& v) {
   std::vector<Vector3d> found;
   for (int n = 0; n < 27; ++n) {

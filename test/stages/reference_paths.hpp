@@ -1,4 +1,4 @@
-/// Sweeps, one path at a time (Algorithm 1), and the median (eq. 8).
+/// Sweeps, one path at a time (Algorithm 1), the median (eq. 8), and candidates (eq. 13).
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace frontier_surfels::reference {
 /// [family][event]
 using Events = std::array<std::array<Field<char>, EVENT_PLANES>, 3>;
 
-/// Walks one path from voxel `at` on in direction `step` while it is in the grid, starting with state e.
+/// Walks a path from voxel `at` in direction `step` to the end of the grid, starting with state e.
 inline void walk(const std::array<Field<char>, EVENT_PLANES>& events, int enter, int exit, std::array<int, 3> at, std::array<int, 3> step,
                  bool e, Field<char>& known) {
   while (known.contains(at[0], at[1], at[2])) {
@@ -28,7 +28,7 @@ inline void walk(const std::array<Field<char>, EVENT_PLANES>& events, int enter,
   }
 }
 
-/// K': the OR over the six sweeps.
+/// K': the OR of the six sweeps.
 /// @param hull  state of the paths at each face: [size_j][1][size_k] (i faces), [size_i][1][size_k] (j), [size_j][1][size_i] (k)
 inline Field<char> sweep(const Events& events, const std::vector<Field<char>>& hull) {
   const Field<char>& any = events[0][0];
@@ -52,7 +52,7 @@ inline Field<char> sweep(const Events& events, const std::vector<Field<char>>& h
   return known;
 }
 
-/// K~: enough of the 27 voxels around each one; beyond the grid its border repeats.
+/// K~: voxels with at least `votes` known ones among the 27 around and including them. Beyond the grid the border voxels repeat.
 inline Field<char> median(const Field<char>& known, int votes) {
   Field<char> filtered(known.size_i, known.size_j, known.size_k, 0);
   for_each_voxel(known, [&](int i, int j, int k) {
@@ -67,7 +67,8 @@ inline Field<char> median(const Field<char>& known, int votes) {
   return filtered;
 }
 
-/// Voxels for new surfels - eq. (13), before it is asked whether they are known, or taken: unobserved, a 6-neighbour observed.
+/// Candidates for new surfels - eq. (13) without the conditions on known space and existing surfels: unobserved voxels with an observed
+/// 6-neighbour.
 inline Field<char> candidates(const Field<char>& observed) {
   Field<char> found(observed.size_i, observed.size_j, observed.size_k, 0);
   const std::array<std::array<int, 3>, 6> sides = {{{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};

@@ -1,4 +1,4 @@
-/// Inner product sign field D over the whole grid and one voxel around it, and its events by their definition - supplement B, Algorithm 1.
+/// Inner product sign field D over the grid and one voxel around it, and its events, by definition - supplement B, Algorithm 1.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace frontier_surfels::reference {
 
-/// A sum of whole numbers; the device's may be off by `slack`: so many of its weights lie where rounding is undecided.
+/// A sum of whole numbers. The device's sum may differ by up to `slack`, the number of weights that may be rounded either way.
 struct Sum {
   int value = 0;
   int slack = 0;
@@ -33,7 +33,7 @@ class SignField {
 
   const Field<Truth>& invalid(int family) const { return invalid_[family]; }
 
-  /// Is there this event in a voxel of a family's path?
+  /// Does a family's path have this event in a voxel?
   Truth event(int family, int event, int i, int j, int k) const {
     const bool forward = event == EVENT_ENTER_FORWARD || event == EVENT_EXIT_FORWARD;
     const bool enter = event == EVENT_ENTER_FORWARD || event == EVENT_ENTER_BACKWARD;
@@ -62,14 +62,14 @@ class SignField {
     const Eigen::Vector3d u(di + s.ray_x * dk, dj + s.ray_y * dk, dk);
     const double t = limits_.thickness, rho = s.reach, along = u.dot(n), in_plane = (u - along * n).norm();
     const double e = std::sqrt(along * along / (t * t) + in_plane * in_plane / (rho * rho));
-    constexpr double kTolerance = 1e-4;  // of e, and of distances [voxel]
+    constexpr double kTolerance = 1e-4;  // for e, and for distances [voxel]
     if (e > 1 + kTolerance) return;
 
     const double weight = SIGN_FIELD_ONE * std::max(1 - e, 0.0), fraction = weight - std::floor(weight);
-    // The error of e^2 in float is about 5e-6, that of its root larger near zero.
+    // The error of e^2 in float is about 5e-6. The error of its root is larger near zero.
     const bool undecided = std::abs(fraction - 0.5) < 1e-3 + SIGN_FIELD_ONE * 5e-6 / std::max(e, 0.003);
     std::array<double, 3> g_tau = {s.n_x, s.n_y, s.n_k};
-    if (s.ragged != 0) g_tau = {0, 0, 0};  // ours: opens no path
+    if (s.ragged != 0) g_tau = {0, 0, 0};  // our addition: a ragged surfel opens no path
     for (int family = 0; family < 3; ++family) {
       if (std::abs(g_tau[family]) > limits_.th_d) {
         Sum& sum = sum_[family](i + 1, j + 1, k + 1);

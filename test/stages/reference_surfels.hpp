@@ -1,4 +1,4 @@
-/// A surfel of the map as the view's grid sees it, and how random ones are put around a view.
+/// A surfel of the map as the view's grid sees it, and random surfels around a view.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,22 @@
 
 namespace frontier_surfels::reference {
 
-/// Bit by bit.
+/// Are all fields equal?
 inline bool same(const Surfel& a, const Surfel& b) {
   return a.id == b.id && a.position == b.position && a.normal == b.normal && a.radius == b.radius && a.label == b.label && a.rgb == b.rgb;
 }
 
-/// So far from where it was put a surfel of the map may stand along an axis [m].
+/// Step of the map's positions [m]: along each axis a stored surfel is at most this far from its given position.
 inline double position_step(const Config& config) { return block_size_for(config.z_max) / 65536; }
 
-/// The surfel that the map has of this one.
+/// The surfel after packing into the map and unpacking.
 inline Surfel quantised(const Surfel& surfel, const Config& config) {
   const double block_size = block_size_for(config.z_max);
   const BlockKey block = block_of(surfel.position, block_size);
   return unpack(pack(surfel, block, block_size), block, block_size);
 }
 
-/// Every `stride`-th surfel's slot.
+/// Slots of every `stride`-th surfel.
 inline std::vector<std::uint32_t> some_slots(const std::vector<Surfel>& surfels, std::size_t stride) {
   std::vector<std::uint32_t> slots;
   for (std::size_t n = 0; n < surfels.size(); n += stride) slots.push_back(surfels[n].id);
@@ -43,7 +43,7 @@ struct SeenSurfel {
   Vector3d normal;      ///< camera frame
   double n_k;           ///< cosine with the paths along k
   bool ragged = false;  ///< opens no path to known space
-  Vector3d ray;         ///< what a step along k moves, in locally metric voxel coordinates
+  Vector3d ray;         ///< motion of a step along k, in locally metric voxel coordinates
 };
 
 inline SeenSurfel see(const Nuvg& grid, const Eigen::Isometry3d& T_camera_world, const Surfel& surfel) {
@@ -59,7 +59,7 @@ inline SeenSurfel see(const Nuvg& grid, const Eigen::Isometry3d& T_camera_world,
 }
 
 /// Surfels in the grid and up to `around` voxels beyond it.
-/// @param largest  radius [voxel]
+/// @param largest  largest radius [voxel]
 inline std::vector<Surfel> random_surfels(const Nuvg& grid, const Eigen::Isometry3d& T_world_camera, int count, double around,
                                           double largest, Random& random) {
   std::vector<Surfel> surfels;

@@ -12,18 +12,18 @@ namespace frontier_surfels::reference {
 struct SeenView {
   WorkingImage image;
   Eigen::Isometry3d T_world_camera;
-  double depth_step;  ///< depths are kept rounded down to a multiple of it [m]
+  double depth_step;  ///< kept depths are rounded down to a multiple of this [m]
 };
 
-/// Steps that a depth is kept as, 16 bits.
+/// Number of steps, 16 bits, as which a depth is kept.
 inline double kept_steps(float depth, double depth_step) { return std::min(std::floor(std::abs(depth) / depth_step), 65535.0); }
 
-/// Does a view's camera see a point in its own frame: is the pixel there valid, and deeper?
+/// Does a view know a point, given in its camera's frame? It does if the pixel at the point has a larger depth.
 inline Truth camera_knows(const SeenView& view, const Vector3d& p) {
   if (p.z() <= 0) return p.z() > -1e-6 ? Truth::open : Truth::no;
   const Intrinsics& camera = view.image.intrinsics;
   const double s = p.x() * camera.fx / p.z() + camera.cx, t = p.y() * camera.fy / p.z() + camera.cy;
-  // What float leaves open: by how many pixels the point may be elsewhere.
+  // In float the point's image may be off by this many pixels.
   const double tolerance = 1e-4 + 4e-6 / p.z() * (camera.fx + camera.fy) * (1 + p.norm() / p.z());
   bool yes = false, no = false, open = false;
   for (const double ds : {-tolerance, tolerance})

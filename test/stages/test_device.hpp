@@ -1,4 +1,4 @@
-/// The OpenCL device that tests of stages run on.
+/// The OpenCL device for the tests of stages.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +10,13 @@
 
 namespace frontier_surfels {
 
-/// The OpenCL platform to test on, part of its name; empty: the first.
+/// Part of the name of the OpenCL platform to test; empty: the first platform.
 inline std::string test_platform() {
   const char* platform = std::getenv("FRONTIER_SURFELS_TEST_PLATFORM");
   return platform == nullptr ? "" : platform;
 }
 
-/// Which device to test on, and at which width: FRONTIER_SURFELS_TEST_LANES is 16 or 1; without it the width is the device's own.
+/// Configuration with the platform to test, and the lanes from FRONTIER_SURFELS_TEST_LANES (16 or 1); without it the device's own number.
 inline Config test_config() {
   Config config;
   config.platform = test_platform();
@@ -27,14 +27,14 @@ inline Config test_config() {
 
 inline Device test_device() { return choose_device(test_config()); }
 
-/// Built once a program: compiling the kernels takes longer than most tests. Never destroyed: at the program's end a driver may be gone
-/// before it.
+/// Built once per program, because compiling the kernels takes longer than most tests. Never destroyed, because a driver may be unloaded
+/// earlier.
 inline Commands& test_commands() {
   static auto* const commands = new Commands(test_device());
   return *commands;
 }
 
-/// The same with one thread; null where the device cannot be limited to that.
+/// The same device limited to one thread; null if it cannot be limited.
 inline std::unique_ptr<Commands> one_thread_commands() {
   const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
   if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end()) return nullptr;

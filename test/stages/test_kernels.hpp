@@ -1,4 +1,4 @@
-/// Kernels of a test's own, which call the functions of the library's kernel files.
+/// Test kernels that call functions of the library's kernel files.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace frontier_surfels {
 
 class TestKernels {
  public:
-  /// @param source  OpenCL C that follows the library's own and kLanesOfElements
+  /// @param source  OpenCL C that is compiled behind the library's kernels and kLanesOfElements
   explicit TestKernels(const std::string& source) : device_(test_commands().device()), queue_(device_.context, device_.device) {
     std::string text;
     for (const KernelFile& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
@@ -24,7 +24,7 @@ class TestKernels {
     }
   }
 
-  /// Runs a kernel whose first argument is `out`, zero before, and whose second one is `in`. @return `out_size` numbers
+  /// Runs a kernel whose first argument is `out`, filled with zeros, and whose second one is `in`. @return `out_size` values of `out`
   template <typename Out, typename In, typename... Args>
   std::vector<Out> run(const char* kernel, std::size_t items, const std::vector<In>& in, std::size_t out_size, const Args&... args) {
     const cl::Buffer from(device_.context, CL_MEM_READ_WRITE, std::max<std::size_t>(in.size(), 1) * sizeof(In));
@@ -32,7 +32,7 @@ class TestKernels {
     queue_.enqueueFillBuffer(to, cl_uchar{0}, 0, out_size * sizeof(Out));
     if (!in.empty()) queue_.enqueueWriteBuffer(from, CL_TRUE, 0, in.size() * sizeof(In), in.data());
     const cl::Kernel function(program_, kernel);
-    const std::size_t group = function.getWorkGroupInfo<CL_KERNEL_COMPILE_WORK_GROUP_SIZE>(device_.device)[0];  // 0: it does not say
+    const std::size_t group = function.getWorkGroupInfo<CL_KERNEL_COMPILE_WORK_GROUP_SIZE>(device_.device)[0];  // 0: not given
     cl::KernelFunctor<cl::Buffer, cl::Buffer, Args...> functor(function);
     functor(cl::EnqueueArgs(queue_, cl::NDRange(items), group == 0 ? cl::NullRange : cl::NDRange(group)), to, from, args...);
     std::vector<Out> out(out_size);
@@ -40,7 +40,8 @@ class TestKernels {
     return out;
   }
 
-  /// The same of a kernel whose work item n handles elements LANES n ... of `in`. @param per_element  numbers of `out` for each element
+  /// As run(), for a kernel whose work item n handles LANES elements of `in`, from element LANES n on.
+  /// @param per_element  values of `out` for each element
   template <typename Out, typename In, typename... Args>
   std::vector<Out> run_lanes(const char* kernel, std::vector<In> in, std::size_t per_element, const Args&... args) {
     const std::size_t size = in.size(), lanes = test_commands().lanes(), items = test_commands().chunks(size);
@@ -51,7 +52,7 @@ class TestKernels {
   }
 
  private:
-  /// LANES elements of a buffer of float4 or int4.
+  /// Functions that load or store LANES elements of a buffer of float4 or int4.
   static constexpr const char* kLanesOfElements = R"CL(
 INLINE Points load_points(__global const float4* from) {
   const Quads q = load_quads((__global const uint4*)from);

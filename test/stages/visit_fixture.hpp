@@ -1,4 +1,4 @@
-/// A frame up to the visit of its surfels.
+/// A frame with the stages up to the visit of its surfels.
 #pragma once
 
 #include "frame_fixture.hpp"
@@ -24,7 +24,7 @@ struct VisitFixture : FrameFixture {
     find_candidates(space.bits());
   }
 
-  /// @param with  observed space; the columns' ends are always the image's
+  /// @param with  observed space; the ends of columns always come from the image
   void find_candidates(const BitField& with) { candidates.find(frame(), with, visit.counters()); }
 
   SurfelVisit::Found look(const BitField& with) {
@@ -32,7 +32,7 @@ struct VisitFixture : FrameFixture {
   }
   SurfelVisit::Found look() { return look(space.bits()); }
 
-  /// Splits the large surfels that look() has found, and looks again. @return surfels that this adds
+  /// Splits the large surfels that look() has found, and looks again. @return number of added surfels
   std::size_t split() {
     const std::size_t added = splitting.split(frame(), visit.large(), map());
     find_candidates(space.bits());
@@ -43,7 +43,7 @@ struct VisitFixture : FrameFixture {
   std::vector<std::uint32_t> in_view_slots() const { return access().slots(visit.in_view()); }
 
   ObservedSpace space;
-  BitField observed;  ///< for tests that make C~ themselves
+  BitField observed;  ///< for tests that provide C~ themselves
   Candidates candidates;
   SurfelVisit visit;
   SurfelSplit splitting;
