@@ -38,7 +38,7 @@
 #define OF_LANES(name) name
 #define vloadv(offset, from) ((from)[offset])
 #define vstorev(values, offset, to) ((to)[offset] = (values))
-#define MARK(condition) (-((condition)&1))
+#define MARK(condition) (-(1 & (condition)))
 #define GATHER(values, at) values[at]
 #else
 #error "LANES must be 16 or 1"

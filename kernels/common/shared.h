@@ -88,8 +88,7 @@ namespace frontier_surfels {
 // Numbers of the method ------------------------------------------------------------------------------------------------------------------
 // Those that depend on parameters, or that the host needs as well, are in Limits below.
 
-// Weights of the sign field are whole numbers: 1.0 is SIGN_FIELD_ONE. Integer sums do not depend on the order of the surfels. - Supplement
-// B
+// Weights of the sign field are whole numbers, 1.0 is SIGN_FIELD_ONE: integer sums do not depend on the order of surfels. - Supplement B
 #define SIGN_FIELD_ONE 256
 
 // Surfels in view are those whose ellipsoid comes so near to the grid; generous, as more of them change nothing [voxel]. - Paper 3.4

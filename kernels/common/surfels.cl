@@ -12,8 +12,7 @@
 
 #define PAGE_ITEMS (PAGE_SLOTS / LANES)
 
-// Positive floats as 16 bits (IEEE half precision), rounded to nearest. Those that are too small or too large become the nearest that
-// exist.
+// Positive floats as 16 bits (IEEE half precision), rounded to nearest; floats that are too small or too large become the nearest ones.
 INLINE uintv floats_to_halves(floatv x) { return (as_uintv(clamp(x, 6.2e-5f, 65000.0f)) + 0x1000u - (112u << 23)) >> 13; }
 INLINE floatv halves_to_floats(uintv bits) { return as_floatv((bits << 13) + (112u << 23)); }
 

@@ -1,5 +1,5 @@
-// Kept views: exact membership of points in the space that a view has seen, and which views may know something of a
-// box at all, so that no others are asked.
+// Kept views: exact membership of points in the space that a view has seen, and which views may know something of a box at all, so that no
+// others are asked.
 //
 // A view's image is kept in patches (PATCH_COLUMNS x PATCH_ROWS pixels), depths as whole steps of 16 bits, rounded down and without signs;
 // behind it lie the largest depths of its blocks of VIEW_BLOCK x VIEW_BLOCK pixels (common/shared.h).
@@ -33,7 +33,7 @@ INLINE intv sees(const View* view, __global const ushort* depths, Points q, intv
 }
 
 // Exact membership of points in the space that one view has seen, of those that are asked.
-//   depths: all views' images;  p: camera frame of this frame [m]
+//   depths: all views' images;  p: in the frame of this frame's camera [m]
 INLINE intv knows(const View* view, __global const ushort* depths, Points p, intv asked) {
   return sees(view, depths, transformed(&view->to_image, p), asked);
 }
@@ -54,7 +54,7 @@ typedef struct {
 
 //   group[VIEW_LANE_FIELDS][VIEW_GROUP]: of view_lanes;  part: 0 ... VIEW_PARTS - 1
 INLINE ViewLanes load_view_lanes(__global const float* group, int part) {
-#define FIELD(field) vloadv(VIEW_PARTS* VIEW_LANE_##field + part, group)
+#define FIELD(field) vloadv((VIEW_LANE_##field) * VIEW_PARTS + part, group)
   ViewLanes v = {FIELD(R00),
                  FIELD(R01),
                  FIELD(R02),

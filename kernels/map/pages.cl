@@ -21,9 +21,8 @@ __kernel void count_cells(__global const uint* new_cells, const uint count, __gl
 }
 
 // One work item handles a chunk of the new surfels.
-//   in  new_cells[count]
-//   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends;   out order[count]: new surfels sorted by
-//   cell
+//   in  new_cells[count];   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends
+//   out order[count]: new surfels sorted by cell
 __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __global uint* histogram, __global uint* order) {
   const uint chunk = get_global_id(0);
   if (chunk >= SORT_CHUNKS) return;

@@ -1,5 +1,4 @@
-// Median - paper 3.2, eq. (8): K~(v) = 1 iff at least median_votes of the 27 voxels around v have K' = 1. Beyond the grid its border
-// repeats.
+// Median - paper 3.2, eq. (8): K~(v) = 1 iff at least median_votes of the 27 voxels around v have K' = 1. The grid's border repeats.
 
 // A word's bits moved so that bit k holds what layer k + 1, k - 1 has.
 INLINE ulong layer_above(const Grid* g, __global const ulong* field, int i, int j, int w) {

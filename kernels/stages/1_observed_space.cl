@@ -73,10 +73,10 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
 // One work item handles LANES x SPACE_ROWS columns and a word of their layers; work item (row * words_k + w) * chunks_of(size_i) + chunk
 // has the columns from (LANES chunk, SPACE_ROWS row).
 //   in  column_end, valid: of column_ends
-//       The camera's tables for the cuboid's layers, which are filled up to whole words, and voxels to whole chunks of TABLE_CHUNK:
-//       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: first and one past the last column, row of pixels
-//       whose samples lie in each voxel, as 16-bit halves words_i[layers][chunks]: first and one past the last word of 32 pixels of each
-//       chunk's columns
+//       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: for each voxel along i, along j,
+//         first and one past the last column, row of pixels whose samples lie there, as 16-bit halves
+//       words_i[layers][chunks]: for each chunk of pixels_i, first and one past the last word of 32 pixels that its columns lie in
+//       These tables have the cuboid's layers, filled up to whole words, and voxels filled up to whole chunks of TABLE_CHUNK.
 //   out observed: bit field
 __kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {

@@ -50,9 +50,9 @@ typedef struct {
 } PageFindings;
 
 // One work item handles LANES surfels of a page; work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
-//   in  pages[count]: those of the window;  observed: bit field C~, as 32-bit halves;  depths: images of views, this frame's among them;
-//   depth, column_end: of 1_observed_space;  alive, page_block, surfels: the map i/o candidates: bit field by tiles, as 32-bit halves:
-//   voxels of surfels that stay are taken off
+//   in  pages[count]: those of the window;  depths: images of views, this frame's among them;  depth, column_end: of 1_observed_space
+//       alive, page_block, surfels: the map;  observed: bit field C~, as 32-bit halves
+//   i/o candidates: bit field by tiles, as 32-bit halves: voxels of surfels that stay are taken off
 //       changed: bits of surfels that stay and that 16_labels will label are set
 //       counts[COUNTS]: COUNT_IN_VIEW, COUNT_LARGE and COUNT_REMOVED are added to
 //   out in_view[count], large[count], removed[count]: a bit for each surfel of each page
@@ -81,7 +81,8 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
       found.large = lane_bits(inside & MARK(s.radius / voxel >= f.limits.split_radius));
       const intv bit = half_bits(v.k), candidate = inside ? candidate_halves(&f.grid, v) : 0;
       const intv is_candidate = inside & MARK((gather_int(candidates, candidate) & bit) != 0);
-      // Candidates are not observed: only the others are looked up.
+      // Candidates are not observed: only the others are looked up. A voxel that another work item takes off meanwhile is looked up as
+      // well, which makes no difference.
       const intv rest = inside & ~is_candidate, at = rest ? voxel_halves(&f.grid, v) : 0;
       intv stay = is_candidate | (rest & MARK((gather_int(observed, at) & bit) == 0));
       const Points normal = rotated(&f.T_camera_local, unpack_normals(s.normal));

@@ -4,8 +4,7 @@
 //   e^2 = (u.n)^2 / t^2 + |u - (u.n) n|^2 / rho^2,  weight w = 1 - e where e < 1;  g_tau = <n, t_tau>
 //   |g_tau| > th_d: D_tau += sign(g_tau) w;   else, where e < 1 and |u - (u.n) n| < rho / 2: the voxel is invalid for family tau.
 // Ours: a ragged surfel (15_creation) makes voxels invalid for every family.
-// One work-group handles one tile in local memory. Its sums are integers, so the order of surfels and the number of work items do not
-// matter.
+// One work-group handles one tile in local memory. Its sums are integers: the order of surfels and the number of work items do not matter.
 
 // Surfels as the view's grid sees them.
 //   s, normal: camera frame;   out placed[LANES]
@@ -126,9 +125,8 @@ bool tile_range(const Grid* g, const Limits* limits, const ViewSurfel* s, int3* 
 // Tiles along each axis; along k they fill whole words.
 int3 tiles_of(const Grid* g) { return (int3)((g->size_i - 1) / TILE_I + 1, (g->size_j - 1) / TILE_J + 1, g->words_k * (64 / TILE_K)); }
 
-// One work item handles a surfel in view: it counts the surfels that touch each tile. Tile (i, j, k) has number (k tiles_j + j) tiles_i +
-// i.
-//   i/o tile_counts[tiles], zero before
+// One work item handles a surfel in view: it counts the surfels that touch each tile.
+//   i/o tile_counts[tiles]: zero before; tile (i, j, k) has number (k tiles_j + j) tiles_i + i
 __kernel void count_tiles(const Frame f, __global const ViewSurfel* view_surfels, const uint count, __global uint* tile_counts) {
   const uint n = get_global_id(0);
   if (n >= count) return;
