@@ -43,8 +43,8 @@ class Mapper {
   /// new ids when they come back.
   Changes changes(std::uint64_t since) const;
 
-  /// Writes the map as a PLY file, to a temporary file first that is then renamed. With a map_folder all of it, which must fit into memory
-  /// for that moment. @throws FileError
+  /// Writes the map as a PLY or PCD file, whichever the path ends in (map_file.hpp), to a temporary file first that is then renamed. With a
+  /// map_folder all of it, which must fit into memory for that moment. @throws FileError
   void save(const std::string& path) const;
 
   /// Replaces the map by a saved one, and forgets what is not in the file: the recent views, and which surfels stand in thin space (the
