@@ -1,14 +1,20 @@
-# Libraries, headers, programs and data; find_package(frontier_surfels) with and without ROS.
+# Installs libraries, headers, programs and data, and what find_package(frontier_surfels) needs, with and without ROS.
 
-# Programs and libraries find each other wherever the prefix is moved to.
+# RPATHs are relative, so that programs find the libraries wherever the prefix is moved to.
 file(RELATIVE_PATH to_libraries /${INSTALL_PROGRAMS_TO} /${INSTALL_LIBRARIES_TO})
-set_target_properties(${PROGRAMS} PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
-set_target_properties(frontier_surfels frontier_surfels_scoring PROPERTIES INSTALL_RPATH "$ORIGIN")
-
-install(TARGETS frontier_surfels frontier_surfels_scoring EXPORT frontier_surfelsTargets
-  LIBRARY DESTINATION ${INSTALL_LIBRARIES_TO})
-install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
-install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO})
+set_target_properties(${LIBRARIES} PROPERTIES INSTALL_RPATH "$ORIGIN")
+install(TARGETS ${LIBRARIES} EXPORT frontier_surfelsTargets LIBRARY DESTINATION ${INSTALL_LIBRARIES_TO})
+install(DIRECTORY include/frontier_surfels/ DESTINATION ${INSTALL_INCLUDES_TO}
+  PATTERN scoring EXCLUDE)
+install(DIRECTORY config DESTINATION ${INSTALL_SHARE_TO})
+if(FRONTIER_SURFELS_TOOLS)
+  set_target_properties(${PROGRAMS} PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
+  install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
+  install(DIRECTORY include/frontier_surfels/scoring DESTINATION ${INSTALL_INCLUDES_TO})
+  install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # the report's template
+  file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)
+  install(PROGRAMS ${PYTHON_SCRIPTS} DESTINATION ${INSTALL_PROGRAMS_TO})  # replay_score looks for them beside itself
+endif()
 if(FRONTIER_SURFELS_WITH_ROS)
   set_target_properties(mapper_node PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
   set_target_properties(frontier_surfels_ros PROPERTIES INSTALL_RPATH "$ORIGIN")
@@ -17,12 +23,9 @@ if(FRONTIER_SURFELS_WITH_ROS)
   install(FILES nodelet_plugins.xml DESTINATION ${INSTALL_SHARE_TO})
   install(DIRECTORY launch rviz DESTINATION ${INSTALL_SHARE_TO})
 endif()
-install(DIRECTORY config DESTINATION ${INSTALL_SHARE_TO})
-install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # the report's template
-file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)
-install(PROGRAMS ${PYTHON_SCRIPTS} DESTINATION ${INSTALL_PROGRAMS_TO})  # beside the programs that run them
 
-# With catkin its own config file includes frontier_surfels-extras.cmake, which includes the targets; without, ours does.
+# With catkin, find_package reads catkin's own config file, which includes frontier_surfels-extras.cmake; without catkin,
+# frontier_surfels-extras.cmake itself is the config file. It includes the targets.
 if(FRONTIER_SURFELS_WITH_ROS)
   set(package_dir ${INSTALL_SHARE_TO}/cmake)
   if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")

@@ -1,14 +1,16 @@
-# One gtest program per test/test_*.cpp, and per test/ros/test_*.cpp where there is ROS; run by ctest.
+# ctest runs one gtest program for each test/test_*.cpp and, with ROS, for each test/ros/test_*.cpp.
 
 enable_testing()
 find_package(GTest REQUIRED)
 
-# Recorded sequences that some tests need; they are skipped without.
+# Some tests need recorded sequences. Without them these tests are skipped.
 set(FRONTIER_SURFELS_DATA "${PROJECT_SOURCE_DIR}/../shared/data" CACHE PATH "folder of recorded sequences for the tests")
 
 set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
 file(MAKE_DIRECTORY ${POCL_CACHE})
 
+# Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
+set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room).*)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB ROS_TEST_SOURCES CONFIGURE_DEPENDS test/ros/test_*.cpp)
@@ -19,16 +21,28 @@ if(FRONTIER_SURFELS_WITH_ROS)
   endif()
   list(APPEND TEST_SOURCES ${ROS_TEST_SOURCES})
 endif()
+if(NOT FRONTIER_SURFELS_TOOLS)
+  list(FILTER TEST_SOURCES EXCLUDE REGEX ${NEED_TOOLS})
+endif()
+find_package(PCL QUIET COMPONENTS common)
+find_library(PCL_IO_LIBRARY pcl_io)  # the component io would look for VTK and MPI as well
+if(NOT PCL_FOUND OR NOT PCL_IO_LIBRARY)
+  list(FILTER TEST_SOURCES EXCLUDE REGEX "/test_pcl\\.cpp$")
+  message(WARNING "frontier_surfels: PCL was not found, so its test is LEFT OUT. Run scripts/install_dependencies --test.")
+endif()
 
 foreach(source ${TEST_SOURCES})
   get_filename_component(name ${source} NAME_WE)
-  set(target frontier_surfels_${name})  # in a workspace all packages share the names of targets
+  set(target frontier_surfels_${name})  # the packages of a workspace share one set of target names
   add_executable(${target} ${source})
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
   target_include_directories(${target} PRIVATE src kernels test)
   target_compile_definitions(${target} PRIVATE
     FRONTIER_SURFELS_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FRONTIER_SURFELS_DATA_DIR="${FRONTIER_SURFELS_DATA}")
-  target_link_libraries(${target} PRIVATE frontier_surfels_replay frontier_surfels_opencl GTest::gtest_main)
+  target_link_libraries(${target} PRIVATE frontier_surfels frontier_surfels_opencl SQLiteCpp Threads::Threads GTest::gtest_main)
+  if(source MATCHES ${NEED_TOOLS})
+    target_link_libraries(${target} PRIVATE frontier_surfels_replay)
+  endif()
   add_test(NAME ${name} COMMAND ${target})
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
   if(name MATCHES "^test_(stage_|surfel_packing)")  # kernels are tested at both widths
@@ -36,7 +50,7 @@ foreach(source ${TEST_SOURCES})
     set_tests_properties(${name}_lanes_1 PROPERTIES
       ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE};FRONTIER_SURFELS_TEST_LANES=1" TIMEOUT 600)
   endif()
-  if(CATKIN_TOPLEVEL)  # in a workspace only `make tests` builds tests
+  if(CATKIN_TOPLEVEL)  # in a workspace, tests are built only by `make tests`
     set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL TRUE)
     if(TARGET tests)
       add_dependencies(tests ${target})
@@ -50,7 +64,16 @@ if(TARGET frontier_surfels_test_pcl_clouds)
   target_link_libraries(frontier_surfels_test_pcl_clouds PRIVATE ${pcl_conversions_LIBRARIES})
 endif()
 
-# The command line from outside. /usr/bin: the Python that has the modules of the report.
+if(TARGET frontier_surfels_test_pcl)
+  target_include_directories(frontier_surfels_test_pcl SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
+  target_link_libraries(frontier_surfels_test_pcl PRIVATE ${PCL_LIBRARIES} ${PCL_IO_LIBRARY})
+endif()
+
+if(NOT FRONTIER_SURFELS_TOOLS)
+  return()
+endif()
+
+# The programs as a user calls them. /usr/bin/python3 is the Python that has the report's modules.
 add_test(NAME test_replay_score
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
 add_test(NAME test_bench

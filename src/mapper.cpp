@@ -8,7 +8,7 @@
 #include "frame/limits.hpp"
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
-#include "frontier_surfels/ply.hpp"
+#include "frontier_surfels/map_file.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "stages/candidates.hpp"
@@ -240,11 +240,11 @@ void Mapper::save(const std::string& path) const {
     const std::vector<Surfel> stored = impl_->archive->stored();
     all.insert(all.end(), stored.begin(), stored.end());
   }
-  write_ply(path, all);
+  write_map(path, all);
 }
 
 void Mapper::load(const std::string& path) {
-  const std::vector<Surfel> surfels = read_ply(path);
+  const std::vector<Surfel> surfels = read_map(path);
   try {
     load(surfels);
   } catch (const DeviceError&) {

@@ -1,4 +1,5 @@
 /// Map folders: what was written is read again; what is damaged, or not ours, is refused.
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +11,6 @@
 #include <unordered_set>
 
 #include "map_folder_input.hpp"
-#include "storage/sqlite.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -31,7 +31,7 @@ class MapFolderFiles : public MapFolders {
     return content;
   }
 
-  void run_sql(const char* sql) { Database(file_.string()).run(sql); }
+  void run_sql(const char* sql) { SQLite::Database(file_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec(sql); }
 };
 
 TEST_F(MapFolderFiles, WhatWasWrittenIsReadAgain) {
@@ -214,7 +214,7 @@ TEST_F(MapFolderFiles, WhatMayNotBeWrittenIsRefused) {
   EXPECT_TRUE(says(fault_with(closed, fs::perms::all, path_ + "/sub"), "cannot be made"));
   EXPECT_TRUE(says(fault_with(closed, fs::perms::all, path_), "cannot be"));
   EXPECT_TRUE(says(fault_with(fs::perms::all, readable, path_), "cannot be opened for writing"));
-  EXPECT_EQ(fault_with(fs::perms::all, fs::perms::all, path_), "nothing was refused");
+  EXPECT_EQ(fault_with(fs::perms::all, fs::perms::all, path_), "no FileError was thrown");
 }
 
 TEST_F(MapFolderFiles, KeysOfNeighboursSpread) {

@@ -1,4 +1,5 @@
 /// Faults of map folders: a killed mapper, a full disk, damaged blocks, unusable folders.
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sys/wait.h>
 
@@ -11,7 +12,6 @@
 
 #include "file_size_limit.hpp"
 #include "mapper_archive_input.hpp"
-#include "storage/sqlite.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -125,7 +125,9 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   Mapper plain(walking()), mapper(walking(path_));
   integrate_all(plain, all);
   Follower follower;
-  const auto damage = [&] { Database((std::filesystem::path(path_) / "map.sqlite").string()).run("UPDATE blocks SET crc = ~crc"); };
+  const auto damage = [&] {
+    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec("UPDATE blocks SET crc = ~crc");
+  };
   for (const auto& frame : there) mapper.integrate(frame.view());
   follower.apply(mapper.changes(0));
   std::size_t refused = 0;

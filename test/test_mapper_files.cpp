@@ -91,6 +91,24 @@ TEST_F(MapperFiles, ASavedMapComesBack) {
   EXPECT_TRUE(same(other.surfels(), third.surfels())) << "a loaded map keeps its ids when it is saved and loaded again";
 }
 
+TEST_F(MapperFiles, TheEndingOfThePathDecidesTheFormat) {
+  const std::string pcd = (folder_ / "map.pcd").string();
+  mapper_.save(path_);
+  mapper_.save(pcd);
+  EXPECT_EQ(bytes_of(path_).substr(0, 4), "ply\n");
+  EXPECT_EQ(bytes_of(pcd).substr(0, 11), "# .PCD v0.7");
+  Mapper from_ply(undecimated()), from_pcd(undecimated());
+  from_ply.load(path_);
+  from_pcd.load(pcd);
+  EXPECT_TRUE(same(from_ply.surfels(), from_pcd.surfels()));
+
+  const std::string other = (folder_ / "map.txt").string();
+  const std::string sentence = "The path '" + other + "' of a map must end in .ply or .pcd: give one that does.";
+  EXPECT_EQ(fault_of<FileError>([&] { mapper_.save(other); }), sentence);
+  EXPECT_EQ(fault_of<FileError>([&] { mapper_.load(other); }), sentence);
+  EXPECT_TRUE(same(surfels_, mapper_.surfels()));
+}
+
 TEST_F(MapperFiles, LoadingSurfelsIsLikeLoadingAFile) {
   mapper_.save(path_);
   Mapper from_file(undecimated());

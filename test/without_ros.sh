@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds everything without ROS and proves that no ROS is in it. Usage: without_ros.sh BUILD [CMAKE OPTION...]
+# Builds everything without ROS and checks that nothing links ROS. Usage: without_ros.sh BUILD [CMAKE OPTION...]
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 build=$1
@@ -13,7 +13,7 @@ for file in "$build"/lib/*.so "$build"/bin/*; do
     exit 1
   fi
 done
-# What is a bag's is then refused with a sentence, not half done.
+# replay_score then refuses a bag, with a sentence that says why.
 touch "$build/empty.bag"
 if said=$("$build/bin/replay_score" "$build/empty.bag" --report "$build/report" 2>&1); then
   echo "without_ros: a bag was read without ROS" >&2

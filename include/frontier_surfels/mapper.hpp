@@ -43,8 +43,8 @@ class Mapper {
   /// reported as removed, and as updated with new ids when they come back.
   Changes changes(std::uint64_t since) const;
 
-  /// Writes the map as a PLY file: first to a temporary file, which is then renamed. With a map_folder, the file has the whole map, which
-  /// must fit into memory while it is written. @throws FileError
+  /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. With
+  /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. The recent views are forgotten, and so is which

@@ -14,8 +14,8 @@
 #include <atomic>
 #include <future>
 
+#include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
-#include "frontier_surfels/ply.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
@@ -254,9 +254,9 @@ bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBo
 
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
-    if (request.path.empty()) throw FileError("No path was given: give the path of the PLY file to be written.");
+    if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
     const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
-    write_ply(request.path, surfels);  // on this thread, so that mapping goes on
+    write_map(request.path, surfels);  // on this thread, so that mapping goes on
     return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
   });
 }

@@ -1,5 +1,7 @@
 #include "storage/map_database.hpp"
 
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <SQLiteCpp/VariadicBind.h>
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <sys/file.h>
@@ -13,7 +15,6 @@
 #include <mutex>
 
 #include "frontier_surfels/types.hpp"
-#include "storage/sqlite.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -33,12 +34,15 @@ constexpr char kPut[] =
 /// after a power cut the last transactions may be missing.
 constexpr char kPragmas[] = "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL";
 
+constexpr int kFlags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+constexpr int kBusyTimeout = 5000;  // [ms]: somebody may look into the file with SQLite's own shell
+
 std::string named(const std::string& folder) { return "The map folder " + folder; }
 
 /// What is wrong, and what to do about it.
-FileError explained(const std::string& folder, const SqliteError& error) {
+FileError explained(const std::string& folder, const SQLite::Exception& error) {
   const std::string said = std::string(" (") + error.what() + "): ";
-  switch (error.code) {
+  switch (error.getErrorCode()) {
     case SQLITE_FULL:
       return FileError(named(folder) + " cannot be written" + said + "free some space on its disk.");
     case SQLITE_NOTADB:
@@ -56,17 +60,19 @@ FileError explained(const std::string& folder, const SqliteError& error) {
 }
 
 /// The first number of the first row.
-std::int64_t number(const Database& database, const char* sql) {
-  Statement statement(database, sql);
-  if (!statement.step()) throw SqliteError(SQLITE_CORRUPT, "an empty table");
-  return statement.number(0);
+std::int64_t number(const SQLite::Database& database, const char* sql) {
+  SQLite::Statement statement(database, sql);
+  if (!statement.executeStep()) throw SQLite::Exception("an empty table", SQLITE_CORRUPT);
+  return statement.getColumn(0);
 }
 
-void create_tables(Database& database, double block_size) {
-  Transaction transaction(database);
-  database.run(("PRAGMA application_id = " + std::to_string(kApplication)).c_str());
-  database.run(kTables);
-  Statement(database, "INSERT INTO meta (version, block_size) VALUES (?, ?)").bind(kVersion, block_size).step();
+void create_tables(SQLite::Database& database, double block_size) {
+  SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
+  database.exec("PRAGMA application_id = " + std::to_string(kApplication));
+  database.exec(kTables);
+  SQLite::Statement insert(database, "INSERT INTO meta (version, block_size) VALUES (?, ?)");
+  SQLite::bind(insert, kVersion, block_size);
+  insert.exec();
   transaction.commit();
 }
 
@@ -76,7 +82,7 @@ std::string in_metres(double length) {
   return text;
 }
 
-void check_tables(const Database& database, const std::string& folder, double block_size) {
+void check_tables(const SQLite::Database& database, const std::string& folder, double block_size) {
   if (number(database, "PRAGMA application_id") != kApplication) {
     throw FileError(named(folder) + " has a map.sqlite of another program: give another folder.");
   }
@@ -85,22 +91,24 @@ void check_tables(const Database& database, const std::string& folder, double bl
     throw FileError(named(folder) + " was written by a newer version (format " + std::to_string(version) + ", not " +
                     std::to_string(kVersion) + "): update this one, or give another folder.");
   }
-  Statement made_with(database, "SELECT block_size FROM meta");
-  if (made_with.step() && made_with.real(0) != block_size) {
-    throw FileError(named(folder) + " has blocks of " + in_metres(made_with.real(0)) + ", not of " + in_metres(block_size) +
+  SQLite::Statement made_with(database, "SELECT block_size FROM meta");
+  if (made_with.executeStep() && made_with.getColumn(0).getDouble() != block_size) {
+    throw FileError(named(folder) + " has blocks of " + in_metres(made_with.getColumn(0)) + ", not of " + in_metres(block_size) +
                     ": set that block size again, or give another folder.");
   }
 }
 
 /// Nothing is changed in a file that is not ours.
-Database open_map(const std::string& folder, const std::string& file, double block_size) {
-  Database database(file);
+SQLite::Database open_map(const std::string& folder, const std::string& file, double block_size) {
+  SQLite::Database database(file, kFlags, kBusyTimeout);
+  // SQLite makes do with reading where writing is forbidden.
+  if (sqlite3_db_readonly(database.getHandle(), "main") != 0) throw SQLite::Exception(sqlite3_errstr(SQLITE_READONLY), SQLITE_READONLY);
   if (number(database, "SELECT count(*) FROM sqlite_master") == 0 && number(database, "PRAGMA application_id") == 0) {
     create_tables(database, block_size);
   } else {
     check_tables(database, folder, block_size);
   }
-  database.run(kPragmas);
+  database.exec(kPragmas);
   return database;
 }
 
@@ -114,6 +122,13 @@ std::int64_t checksum(BlockKey key, const std::vector<std::uint8_t>& bytes) {
     crc = crc32_z(crc, little_endian, sizeof little_endian);
   }
   return static_cast<std::int64_t>(crc32_z(crc, bytes.data(), bytes.size()));
+}
+
+/// Makes a statement about one block ready for another one.
+SQLite::Statement& restart(SQLite::Statement& statement, BlockKey key) {
+  statement.tryReset();  // whatever became of it the last time
+  SQLite::bind(statement, key.x, key.y, key.z);
+  return statement;
 }
 
 }  // namespace
@@ -151,13 +166,13 @@ class MapDatabase::Lock {
 struct MapDatabase::Connections {
   Connections(const std::string& folder, const std::string& file, double block_size)
       : writer(open_map(folder, file, block_size)),
-        reader(file),
+        reader(file, kFlags, kBusyTimeout),
         put(writer, kPut),
         erase(writer, "DELETE FROM blocks WHERE x = ? AND y = ? AND z = ?"),
         get(reader, "SELECT crc, bytes FROM blocks WHERE x = ? AND y = ? AND z = ?") {}
 
-  Database writer, reader;  // two: reading does not wait for the disk that a transaction is written to
-  Statement put, erase, get;
+  SQLite::Database writer, reader;  // two: reading does not wait for the disk that a transaction is written to
+  SQLite::Statement put, erase, get;
   std::mutex reading;  // guards reader and get
 };
 
@@ -165,7 +180,7 @@ MapDatabase::MapDatabase(const std::string& folder, double block_size) : folder_
   try {
     const auto file = std::filesystem::absolute(folder) / "map.sqlite";
     connections_ = std::make_unique<Connections>(folder, file.string(), block_size);
-  } catch (const SqliteError& error) {
+  } catch (const SQLite::Exception& error) {
     throw explained(folder, error);
   }
 }
@@ -175,29 +190,30 @@ MapDatabase::~MapDatabase() = default;
 void MapDatabase::for_each_block(const std::function<void(BlockKey, std::size_t)>& visit) const {
   const std::lock_guard<std::mutex> lock(connections_->reading);
   try {
-    Statement all(connections_->reader, "SELECT x, y, z, length(bytes) FROM blocks");
-    while (all.step()) {
-      const auto coordinate = [&](int column) { return static_cast<std::int32_t>(all.number(column)); };
-      visit({coordinate(0), coordinate(1), coordinate(2)}, static_cast<std::size_t>(all.number(3)));
+    SQLite::Statement all(connections_->reader, "SELECT x, y, z, length(bytes) FROM blocks");
+    while (all.executeStep()) {
+      const BlockKey key = {all.getColumn(0).getInt(), all.getColumn(1).getInt(), all.getColumn(2).getInt()};
+      visit(key, static_cast<std::size_t>(all.getColumn(3).getInt64()));
     }
-  } catch (const SqliteError& error) {
+  } catch (const SQLite::Exception& error) {
     throw explained(folder_, error);
   }
 }
 
 void MapDatabase::write(const std::vector<StoredBlock>& blocks, bool clear) {
   try {
-    Transaction transaction(connections_->writer);
-    if (clear) connections_->writer.run("DELETE FROM blocks");
+    SQLite::Transaction transaction(connections_->writer, SQLite::TransactionBehavior::IMMEDIATE);
+    if (clear) connections_->writer.exec("DELETE FROM blocks");
     for (const auto& [key, bytes] : blocks) {
-      if (bytes.empty()) {
-        connections_->erase.bind(key.x, key.y, key.z).step();
-      } else {
-        connections_->put.bind(key.x, key.y, key.z, checksum(key, bytes), bytes).step();
+      SQLite::Statement& statement = restart(bytes.empty() ? connections_->erase : connections_->put, key);
+      if (!bytes.empty()) {
+        statement.bind(4, checksum(key, bytes));
+        statement.bindNoCopy(5, bytes.data(), static_cast<int>(bytes.size()));
       }
+      statement.exec();
     }
     transaction.commit();
-  } catch (const SqliteError& error) {
+  } catch (const SQLite::Exception& error) {
     throw explained(folder_, error);
   }
 }
@@ -206,15 +222,17 @@ std::vector<std::uint8_t> MapDatabase::read(BlockKey key) const {
   const std::lock_guard<std::mutex> lock(connections_->reading);
   std::string reason = "it is missing";
   try {
-    Statement& get = connections_->get;
-    if (get.bind(key.x, key.y, key.z).step()) {
-      std::vector<std::uint8_t> bytes = get.bytes(1);
-      const bool sound = get.number(0) == checksum(key, bytes);
-      get.reset();
+    SQLite::Statement& get = restart(connections_->get, key);
+    if (get.executeStep()) {
+      const SQLite::Column column = get.getColumn(1);
+      const auto* data = static_cast<const std::uint8_t*>(column.getBlob());
+      const std::vector<std::uint8_t> bytes(data, data + column.getBytes());
+      const bool sound = get.getColumn(0).getInt64() == checksum(key, bytes);
+      get.tryReset();  // lets its lock go
       if (sound) return bytes;
       reason = "its checksum does not fit";
     }
-  } catch (const SqliteError& error) {
+  } catch (const SQLite::Exception& error) {
     reason = error.what();
   }
   throw FileError("Block (" + std::to_string(key.x) + ", " + std::to_string(key.y) + ", " + std::to_string(key.z) + ") of the map folder " +

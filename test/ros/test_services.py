@@ -83,6 +83,25 @@ class Services(MapperTest):
         self.assertGreater(os.path.getsize(self.path), size)
         self.assertEqual(os.listdir(self.folder), ['map.ply'])
 
+    def test_the_ending_of_the_path_decides_the_format(self):
+        self.map_walk(2)
+        saved = self.mapper.surfels()
+        for name, start in (('map.ply', b'ply\n'), ('map.pcd', b'# .PCD v0.7')):
+            with case(name):
+                path = os.path.join(self.folder, name)
+                self.check_succeeded(self.mapper.save(path))
+                with open(path, 'rb') as file:
+                    self.assertTrue(file.read().startswith(start))
+                self.mapper.reset()
+                self.check_succeeded(self.mapper.load(path))
+                self.assert_same_but_ids(saved, self.mapper.surfels())
+        for name in ('map', 'map.las'):
+            with case(name):
+                path = os.path.join(self.folder, name)
+                self.check_refused(self.mapper.save(path), name + "'", r'must end in \.ply or \.pcd')
+                self.check_refused(self.mapper.load(path), name + "'", r'must end in \.ply or \.pcd')
+        self.assertEqual(sorted(os.listdir(self.folder)), ['map.pcd', 'map.ply'])
+
     def test_save_where_nothing_can_be_written(self):
         self.map_walk(1)
         os.mkdir(self.path)

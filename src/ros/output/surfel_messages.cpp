@@ -9,6 +9,8 @@
 #include <limits>
 #include <string>
 
+#include "frontier_surfels/cloud_color.hpp"
+
 namespace frontier_surfels::messages {
 namespace {
 
@@ -23,14 +25,10 @@ struct Point {
   std::uint32_t id;
   float normal[3];
   std::uint32_t label;
-  std::uint32_t rgb;
+  std::uint32_t rgb;  // cloud_color.hpp
   float radius, confidence, curvature;
 };
 static_assert(sizeof(Point) == kBytesOfSurfel, "points are copied as they lie in memory");
-
-/// In the highest byte of Point::rgb: no colour was seen, and the one that is there is only for show.
-constexpr std::uint32_t kNotSeen = 1U << 24;
-constexpr std::uint32_t kBlue = 0x0000ff, kGrey = 0x808080;
 
 struct Field {
   const char* name;
@@ -52,19 +50,13 @@ constexpr std::array<Field, 12> kFields = {{{"x", PointField::FLOAT32, offsetof(
                                             {"confidence", PointField::FLOAT32, offsetof(Point, confidence)},
                                             {"curvature", PointField::FLOAT32, offsetof(Point, curvature)}}};
 
-std::uint32_t shown_color(const Surfel& s) {
-  const std::uint32_t seen = static_cast<std::uint32_t>(s.rgb[0] << 16 | s.rgb[1] << 8 | s.rgb[2]);
-  if (seen != 0) return seen;
-  return kNotSeen | (s.label == Label::kFrontier ? kBlue : kGrey);
-}
-
 Point to_point(const Surfel& s, Label confident) {
   Point point = {};
   std::memcpy(point.position, s.position.data(), sizeof(point.position));
   std::memcpy(point.normal, s.normal.data(), sizeof(point.normal));
   point.id = s.id;
   point.label = static_cast<std::uint32_t>(s.label);
-  point.rgb = shown_color(s);
+  point.rgb = to_cloud_color(s);
   point.radius = s.radius;
   point.confidence = s.label == confident ? 1 : 0;
   return point;
@@ -76,8 +68,7 @@ Surfel to_surfel(const Point& point) {
   std::memcpy(s.position.data(), point.position, sizeof(point.position));
   std::memcpy(s.normal.data(), point.normal, sizeof(point.normal));
   s.radius = point.radius;
-  const std::uint32_t rgb = point.rgb >> 24 == kNotSeen >> 24 ? 0 : point.rgb;
-  for (int channel = 0; channel < 3; ++channel) s.rgb[channel] = static_cast<std::uint8_t>(rgb >> (16 - 8 * channel));
+  s.rgb = from_cloud_color(point.rgb);
   s.id = point.id;
   s.label = static_cast<Label>(point.label);
   return s;

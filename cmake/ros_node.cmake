@@ -1,0 +1,12 @@
+# The mapper among ROS nodes, and the conversions of ROS messages.
+
+file(GLOB ROS_SOURCES CONFIGURE_DEPENDS src/ros/*.cpp src/ros/*/*.cpp)
+list(FILTER ROS_SOURCES EXCLUDE REGEX "/mapper_node\\.cpp$")
+add_library(frontier_surfels_ros SHARED ${ROS_SOURCES})
+add_dependencies(frontier_surfels_ros ${${PROJECT_NAME}_EXPORTED_TARGETS})
+target_include_directories(frontier_surfels_ros SYSTEM PUBLIC ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})
+target_include_directories(frontier_surfels_ros PUBLIC src)
+target_link_libraries(frontier_surfels_ros PUBLIC frontier_surfels ${catkin_LIBRARIES} ${OpenCV_LIBS} Threads::Threads)
+
+add_executable(mapper_node src/ros/mapper_node.cpp)
+target_link_libraries(mapper_node PRIVATE frontier_surfels_ros)
