@@ -2,18 +2,18 @@
 
 find_package(CLI11 REQUIRED)
 find_package(benchmark REQUIRED)
-find_package(nanoflann REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(octomap REQUIRED)
+find_package(PCL REQUIRED COMPONENTS common kdtree)
 
 # Scores of maps.
 file(GLOB SCORING_SOURCES CONFIGURE_DEPENDS src/scoring/*.cpp)
 add_library(frontier_surfels_scoring SHARED ${SCORING_SOURCES})
-target_include_directories(frontier_surfels_scoring SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+target_include_directories(frontier_surfels_scoring SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS} ${PCL_INCLUDE_DIRS})
 target_include_directories(frontier_surfels_scoring PRIVATE src)
 target_link_libraries(frontier_surfels_scoring
   PUBLIC frontier_surfels
-  PRIVATE ${OCTOMAP_LIBRARIES} nanoflann::nanoflann Threads::Threads)
+  PRIVATE ${OCTOMAP_LIBRARIES} ${PCL_COMMON_LIBRARIES} ${PCL_KDTREE_LIBRARIES} FLANN::FLANN Threads::Threads)
 add_library(frontier_surfels::frontier_surfels_scoring ALIAS frontier_surfels_scoring)
 list(APPEND LIBRARIES frontier_surfels_scoring)
 

@@ -1,16 +1,18 @@
 /// Nearest surfel centre to a point.
 #pragma once
 
-#include <cmath>
+#include <pcl/kdtree/kdtree_flann.h>
+#include <pcl/point_types.h>
+
 #include <limits>
-#include <nanoflann.hpp>
+#include <memory>
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
 
-/// A k-d tree over the finite ones among a cloud's centres. The cloud must outlive it.
+/// A k-d tree of a cloud's finite centres. The cloud must outlive it. Several threads may ask it at once.
 class SurfelTree {
  public:
   struct Neighbour {
@@ -18,42 +20,31 @@ class SurfelTree {
     double distance;       ///< [m]; infinite if there is none
   };
 
-  explicit SurfelTree(const std::vector<Surfel>& surfels) : centres_(finite(surfels)), tree_(3, centres_) { tree_.buildIndex(); }
+  explicit SurfelTree(const std::vector<Surfel>& surfels) {
+    const auto centres = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+    for (const Surfel& surfel : surfels) {
+      if (!surfel.position.allFinite()) continue;
+      surfels_.push_back(&surfel);
+      centres->push_back({surfel.position.x(), surfel.position.y(), surfel.position.z()});
+    }
+    if (!surfels_.empty()) tree_.setInputCloud(centres);  // PCL reports an empty cloud as an error
+  }
   SurfelTree(const SurfelTree&) = delete;
   SurfelTree& operator=(const SurfelTree&) = delete;
 
   Neighbour nearest(const Eigen::Vector3d& p) const {
-    if (!p.allFinite()) return {nullptr, std::numeric_limits<double>::infinity()};
-    std::size_t index = 0;
-    double squared_distance = 0;
-    const bool found = tree_.knnSearch(p.data(), 1, &index, &squared_distance) > 0;
-    if (!found) return {nullptr, std::numeric_limits<double>::infinity()};
-    return {centres_.surfels[index], std::sqrt(squared_distance)};
+    pcl::Indices index(1);
+    std::vector<float> squared_distance(1);
+    const Eigen::Vector3f q = p.cast<float>();
+    if (surfels_.empty() || !q.allFinite() || tree_.nearestKSearch({q.x(), q.y(), q.z()}, 1, index, squared_distance) == 0)
+      return {nullptr, std::numeric_limits<double>::infinity()};
+    const Surfel* surfel = surfels_[index.front()];
+    return {surfel, (surfel->position.cast<double>() - p).norm()};  // PCL's distance has the precision of a float
   }
 
  private:
-  /// What nanoflann asks of a cloud.
-  struct Centres {
-    std::vector<const Surfel*> surfels;
-    std::size_t kdtree_get_point_count() const { return surfels.size(); }
-    double kdtree_get_pt(std::size_t index, std::size_t axis) const { return surfels[index]->position[axis]; }
-    template <typename Box>
-    bool kdtree_get_bbox(Box&) const {
-      return false;
-    }
-  };
-
-  static Centres finite(const std::vector<Surfel>& surfels) {
-    Centres centres;
-    centres.surfels.reserve(surfels.size());
-    for (const Surfel& surfel : surfels) {
-      if (surfel.position.allFinite()) centres.surfels.push_back(&surfel);
-    }
-    return centres;
-  }
-
-  Centres centres_;
-  nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Centres>, Centres, 3, std::size_t> tree_;
+  std::vector<const Surfel*> surfels_;  ///< by their numbers in the tree
+  pcl::KdTreeFLANN<pcl::PointXYZ> tree_;
 };
 
 }  // namespace frontier_surfels::scoring
