@@ -4,7 +4,9 @@ find_package(CLI11 REQUIRED)
 find_package(benchmark REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(octomap REQUIRED)
-find_package(PCL REQUIRED COMPONENTS common kdtree)
+if(NOT PCL_FOUND)
+  message(FATAL_ERROR "The scoring library needs PCL: run scripts/install_dependencies, or build with -DFRONTIER_SURFELS_TOOLS=OFF.")
+endif()
 
 # Scores of maps.
 file(GLOB SCORING_SOURCES CONFIGURE_DEPENDS src/scoring/*.cpp)
