@@ -35,7 +35,7 @@ Config checked(const Config& config) {
   return config;
 }
 
-/// Runs a piece of work on the device; what OpenCL throws becomes one of this library's errors.
+/// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
 template <typename Work>
 auto on_device(Work work) -> decltype(work()) {
   try {
@@ -92,14 +92,14 @@ struct Mapper::Impl {
   SurfelSplit splitting;
   ViewSettling settling;
   CandidateList list;
-  std::optional<KnownSpace> known_space;  ///< from the first frame on that needs it
+  std::optional<KnownSpace> known_space;  ///< made by the first frame that needs it
   Creation creation;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
-  std::uint64_t frame_on_device = 0;  ///< sequence number of the frame that the stages have finished and nothing has come after
-  std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of the last one if it failed half way; 0: none
-  bool pages_changed = false;         ///< since the last finished frame: by one that failed, or by the archive
+  std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
+  std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of a frame that failed half way; 0: none
+  bool pages_changed = false;         ///< by a failed frame or by the archive, since the last finished frame
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -131,25 +131,26 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   SurfelVisit::Found found = visit_surfels(frame, camera);
   report.in_view = found.in_view;
 
-  // Surfels that are large for this view are split - 3.4; their children are visited in their place
+  // Surfels that are too large for this view are split - 3.4. Then the smaller ones are visited
   if (found.large > 0) {
     report.split = splitting.split(frame, visit.large(), map);
     found = visit_surfels(frame, camera);
   }
 
-  // Candidates that a kept view knows are settled - ours -, and so are those on thin sheets of unknown
+  // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
   settling.settle(frame, camera, views, candidates);
   list.list(frame, camera, observed.bits(), candidates);
   close_thin_gaps(commands, frame, camera, observed.column_end(), views, settling.tile_views(), list, candidates);
 
-  // Known space K~ from the surfels, for the candidates left - 3.2, Algorithm 1, eq. (5)-(8). While all views are kept they know all
+  // Known space K~ from the surfels, for the candidates that are left - 3.2, Algorithm 1, eq. (5)-(8). It is not needed as long as no view
+  // has been forgotten: what no view has seen is unknown then
   const BitField* known = nullptr;
   if (!views.complete()) {
     if (!known_space) known_space.emplace(commands, lists);
     known = &known_space->compute(frame, visit.in_view(), candidates, map);
   }
 
-  // New surfel filter - 3.5. Up to here the frame may fail; device memory for what follows is made sure of
+  // New surfel filter - 3.5. The frame may fail up to here: device memory for the rest is reserved now
   report.created = creation.filter(frame, list, candidates, known);
   map.reserve(report.created);
 
@@ -167,9 +168,9 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
 }
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
-  commands.forget_times();  // of a frame that failed half way
+  commands.forget_times();  // a frame that failed half way has left some
   frame_on_device = 0;
-  if (unfinished != 0) {  // it may have split surfels, or noted others as changed
+  if (unfinished != 0) {  // the failed frame may have split surfels, or marked some as changed
     pages_changed = true;
     finish_pages(unfinished);
     unfinished = 0;
@@ -182,7 +183,7 @@ Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry
   return make_frame(camera, map.window(), views, limits);
 }
 
-/// Finds the candidates and goes through the surfels, which take their voxels off them.
+/// Finds the candidates, and then visits the surfels, which clears the candidates in their voxels.
 SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera& camera) {
   candidates.find(frame, observed.bits(), visit.counters());
   return visit.visit(frame, camera, observed.bits(), observed.column_end(), views, map, candidates);
@@ -193,9 +194,9 @@ void Mapper::Impl::finish_pages(std::uint32_t number) {
   if (archive) archive->note_shrunk(shrunk);
 }
 
-/// Once more if surfels have come that are larger than any before: they matter to a wider window.
+/// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
 void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number) {
-  bool changed = std::exchange(pages_changed, true);  // whatever fails
+  bool changed = std::exchange(pages_changed, true);  // stays true if something throws
   const auto reach = [&] { return map.window_reach(camera.grid(), T_world_camera) + KnownHull::kReach * config.z_max; };
   while (archive->follow(T_world_camera.translation(), reach(), number)) changed = true;
   pages_changed = changed;

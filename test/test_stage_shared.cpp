@@ -73,7 +73,7 @@ void check(const std::string& type, const std::vector<std::string>& fields, cons
   }
 }
 
-/// The same of a structure's every field.
+/// Checks a structure whose fields are all listed.
 template <typename T>
 void check_all(const std::string& type, const std::vector<std::string>& fields, const std::vector<std::size_t>& offsets) {
   ASSERT_EQ(4 * fields.size(), sizeof(T)) << "a field is missing in this test";

@@ -38,7 +38,7 @@ INLINE intv knows(const View* view, __global const ushort* depths, Points p, int
   return sees(view, depths, transformed(&view->to_image, p), asked);
 }
 
-// The same of this frame's own view, whose camera has no other orientation.
+// knows() for this frame's own view: its camera is the frame's, so that most of the transform falls away.
 INLINE intv own_view_knows(const View* view, __global const ushort* depths, Points p, intv asked) {
   const Transform* K = &view->to_image;
   return sees(view, depths, (Points){fma(p.x, K->r00, p.z * K->r02), fma(p.y, K->r11, p.z * K->r12), p.z}, asked);

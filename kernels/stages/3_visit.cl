@@ -44,7 +44,7 @@ typedef struct {
   uint in_view, large, removed, labelled;
 } Findings;
 
-// The same of a page.
+// Findings about the surfels of a page.
 typedef struct {
   SharedWord in_view, large, removed, labelled;
 } PageFindings;

@@ -6,13 +6,13 @@
 
 namespace frontier_surfels {
 
-/// The candidates as bits, in words that lie tile by tile (kernels/common/grid.cl: tile_word_index). Stages take bits off.
+/// The candidates as a bit field whose words lie tile by tile (kernels/common/grid.cl: tile_word_index). Later stages clear bits of it.
 class Candidates {
  public:
   explicit Candidates(Commands& commands);
 
-  /// Unobserved voxels beside observed ones. Those with a surfel are among them: the visit of the surfels takes them off.
-  /// @param counters  COUNTS numbers of SurfelVisit, set to zero by this launch: one of their own would cost more than its work
+  /// Finds the unobserved voxels beside observed ones. Voxels with a surfel are among them until SurfelVisit clears them.
+  /// @param counters  SurfelVisit::counters(). This launch sets them to zero, because a launch of its own would cost more than that work.
   void find(const Frame& frame, const BitField& observed, DeviceArray<cl_uint>& counters);
 
   static std::size_t words(const Grid& grid) { return VIEW_TILE * VIEW_TILE * tile_columns(grid); }
@@ -24,7 +24,7 @@ class Candidates {
   BitField candidates_;
 };
 
-/// The candidates that are left, as a list, each with the direction to the observed space around it - paper 3.5, eq. (15).
+/// List of the candidates that are left, each with the direction to the observed space around it - paper 3.5, eq. (15).
 class CandidateList {
  public:
   CandidateList(Commands& commands, Lists& lists);
@@ -32,8 +32,8 @@ class CandidateList {
   void list(const Frame& frame, const Camera& camera, const BitField& observed, const Candidates& candidates);
 
   std::size_t count() const { return count_; }
-  const DeviceArray<cl_uint>& voxels() const { return voxels_; }        ///< [count]: 64 word + bit, ascending
-  const DeviceArray<cl_int>& around() const { return around_; }         ///< [count]: the observed ones of the 27 voxels around, a bit each
+  const DeviceArray<cl_uint>& voxels() const { return voxels_; }  ///< [count]: number of each, 64 word + bit, ascending
+  const DeviceArray<cl_int>& around() const { return around_; }   ///< [count]: a bit for each of the 27 voxels around that is observed
   const DeviceArray<float>& directions() const { return directions_; }  ///< [chunks of LANES][3][LANES]: sums of unit vectors
 
  private:

@@ -13,18 +13,18 @@ class Creation {
  public:
   Creation(Commands& commands, Lists& lists);
 
-  /// Chooses the candidates that make a surfel: those that are not known and have a direction. Makes room for the surfels.
-  /// @param known  K~ of the paper's section 3.2; null where the recent views have settled all
-  /// @return how many
+  /// Chooses the candidates that become surfels: candidates that are not known and have a direction.
+  /// @param known  K~ of the paper's section 3.2; null if the kept views have settled all candidates
+  /// @return number of chosen candidates
   std::size_t filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
 
-  /// Creates the surfels that filter() has chosen, and puts them into the map.
+  /// Makes surfels of the chosen candidates and puts them into the map.
   /// @param tile_views  ViewSettling::tile_views()
   void create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views,
               const CandidateList& list, SurfelMap& map);
 
   std::size_t count() const { return count_; }
-  const DeviceArray<cl_uint>& chosen() const { return chosen_; }  ///< [count]: numbers in the list of candidates, ascending
+  const DeviceArray<cl_uint>& chosen() const { return chosen_; }  ///< [count]: place of each in the list of candidates, ascending
   const NewSurfels& new_surfels() const { return new_; }
 
  private:

@@ -1,4 +1,4 @@
-/// One frame, as all its stages and their kernels see it; and what their host sides have in common.
+/// What all stages of a frame share: the structure that kernels are given, and sizes of launches and buffers.
 #pragma once
 
 #include "common/shared.h"
@@ -9,7 +9,7 @@
 
 namespace frontier_surfels {
 
-/// What all stages of a frame, and their kernels, are told.
+/// Makes the structure that every kernel of a frame is given (kernels/common/shared.h).
 Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const Limits& limits);
 
 /// A bit for each voxel of the grid (kernels/common/grid.cl says where), or for each surfel of the window's pages.
@@ -17,10 +17,10 @@ using BitField = DeviceArray<cl_ulong>;
 
 /// @name Sizes of launches and of buffers
 /// @{
-constexpr std::size_t kGroup = 64;  ///< work items of a group, where a kernel does not ask for another number
-inline std::size_t tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }                              ///< of VIEW_TILE voxels
-inline std::size_t words(const Grid& g) { return static_cast<std::size_t>(g.size_i) * g.size_j * g.words_k; }  ///< of a bit field
-inline std::size_t tile_columns(const Grid& g) { return tiles(g.size_i) * tiles(g.size_j) * g.words_k; }       ///< tiles one word deep
+constexpr std::size_t kGroup = 64;  ///< work items of a group, unless a kernel needs another number
+inline std::size_t tiles(int size) { return (size + VIEW_TILE - 1) / VIEW_TILE; }  ///< tiles of VIEW_TILE voxels along an axis
+inline std::size_t words(const Grid& g) { return static_cast<std::size_t>(g.size_i) * g.size_j * g.words_k; }  ///< words of a bit field
+inline std::size_t tile_columns(const Grid& g) { return tiles(g.size_i) * tiles(g.size_j) * g.words_k; }  ///< tiles that are one word deep
 /// @}
 
 }  // namespace frontier_surfels

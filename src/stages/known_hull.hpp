@@ -11,13 +11,13 @@ class KnownHull {
  public:
   explicit KnownHull(Commands& commands);
 
-  /// Surfels further than this from the grid, in ranges z_max, say nothing of the paths that enter it.
+  /// Only surfels within this distance of the grid count, in units of z_max.
   static constexpr double kReach = 1;
 
   void compute(const Frame& frame, const NeededPaths& needed, const SurfelMap& map);
 
-  /// A bit for each path that enters through a face, face after face (kernels/stages/10_known_hull.cl: hull_word_offset); right on the
-  /// needed paths.
+  /// A bit for each path that enters the grid: is it in known space there? Faces follow each other (hull_word_offset in
+  /// kernels/stages/10_known_hull.cl). Only the bits of needed paths are valid.
   const BitField& states() const { return states_; }
   static std::size_t size(const Grid& grid);
 

@@ -1,7 +1,7 @@
 /// Known space K~ from the surfels - paper 3.2, Algorithm 1, supplements B and C; kernels/stages/8_needed_paths.cl to 12_median.cl.
 ///
-/// It decides about candidates that no kept view knows. Its fields take more memory than all other stages together, so that a mapper makes
-/// it only when views have been forgotten.
+/// Decides about the candidates that no kept view knows. Its fields take more memory than those of all other stages together, so a mapper
+/// makes a KnownSpace only once views have been forgotten.
 #pragma once
 
 #include "map/surfel_map.hpp"
@@ -19,7 +19,7 @@ class KnownSpace {
   KnownSpace(Commands& commands, Lists& lists);
 
   /// @param in_view  SurfelVisit::in_view()
-  /// @return K~, a bit for each voxel; right where there are candidates
+  /// @return K~, a bit for each voxel; only the bits of candidates are valid
   const BitField& compute(const Frame& frame, const BitField& in_view, const Candidates& candidates, const SurfelMap& map);
 
  private:

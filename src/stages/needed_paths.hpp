@@ -12,8 +12,8 @@ class NeededPaths {
 
   void mark(const Frame& frame, const Candidates& candidates);
 
-  /// i paths [size_j][words_k] and j paths [size_i][words_k], a bit each along k, as 32-bit halves; k paths [size_j][size_i], a number
-  /// each.
+  /// Marks of three families: paths along i [size_j][words_k] and along j [size_i][words_k] have a bit for each layer k, as 32-bit halves;
+  /// paths along k [size_j][size_i] have a number each.
   const DeviceArray<cl_uint>& lines() const { return lines_; }
   static std::size_t size(const Grid& grid);
 

@@ -13,7 +13,7 @@ struct NewSurfels {
   }
 
   DeviceArray<cl_uint4> surfels;  ///< packed (kernels/common/surfels.cl)
-  DeviceArray<cl_uint> cells;     ///< block of each: its cell of the map's window
+  DeviceArray<cl_uint> cells;     ///< cell of the map's window, that is the block, of each surfel
 };
 
 }  // namespace frontier_surfels

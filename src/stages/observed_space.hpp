@@ -9,12 +9,12 @@ class ObservedSpace {
  public:
   explicit ObservedSpace(Commands& commands);
 
-  /// @param camera  with the frame's image
+  /// @param camera  the frame's camera, with its image
   void compute(const Frame& frame, const Camera& camera);
 
   const BitField& bits() const { return observed_; }  ///< C~, a bit for each voxel; SPARE_WORDS more words can be read
 
-  /// [height][width] of the working image: the pyramid's layers below this one are observed; 0 where the pixel is no measurement.
+  /// [height][width] of the working image: first layer that is not observed, in the pixel's column of the pyramid; 0 without a measurement.
   const DeviceArray<cl_int>& column_end() const { return column_end_; }
 
  private:

@@ -15,7 +15,7 @@ class PathSweeps {
   /// @param hull    KnownHull::states()
   void sweep(const Frame& frame, const NeededPaths& needed, const BitField& events, const BitField& hull);
 
-  const BitField& known() const { return known_; }  ///< K', a bit for each voxel; right on the needed paths
+  const BitField& known() const { return known_; }  ///< K', a bit for each voxel; only the bits of needed paths are valid
 
  private:
   Commands& commands_;
@@ -27,7 +27,7 @@ class Median {
   explicit Median(Commands& commands) : commands_(commands), filtered_(commands) {}
 
   /// @param known  K'
-  /// @return K~, a bit for each voxel; right where there are candidates
+  /// @return K~, a bit for each voxel; only the bits of candidates are valid
   const BitField& filter(const Frame& frame, const BitField& known, const Candidates& candidates);
 
  private:

@@ -1,4 +1,4 @@
-/// Removal - paper 3.4, eq. (12) - and labels - 3.5: what SurfelVisit has decided of the surfels that were there is done;
+/// Removal - paper 3.4, eq. (12) - and labels - 3.5. Both carry out what SurfelVisit has decided;
 /// kernels/stages/14_removal.cl and 16_labels.cl.
 #pragma once
 
@@ -7,11 +7,11 @@
 
 namespace frontier_surfels {
 
-/// Frees the slots of surfels. @param removed  SurfelVisit::removed(): `count` surfels
+/// Frees the slots of removed surfels. @param removed  SurfelVisit::removed(); @param count  surfels in it
 void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map);
 
-/// Labels and colours surfels at measured surfaces: of those that the frame has changed, which new ones and those that the visit has noted
-/// are.
+/// Labels and colours surfels at measured surfaces. It looks at the surfels that are marked as changed: new ones, and those that
+/// SurfelVisit has marked.
 /// @param column_end  ObservedSpace::column_end()
 void label_surfels(Commands& commands, const Frame& frame, const Camera& camera, const DeviceArray<cl_int>& column_end, SurfelMap& map);
 

@@ -8,7 +8,7 @@
 
 namespace frontier_surfels {
 
-/// The surfels in view as the grid sees them.
+/// The surfels in view, in the coordinates of the grid.
 class ViewSurfels {
  public:
   ViewSurfels(Commands& commands, Lists& lists);
@@ -17,7 +17,7 @@ class ViewSurfels {
   void place(const Frame& frame, const BitField& in_view, const SurfelMap& map);
 
   std::size_t count() const { return count_; }
-  const DeviceArray<ViewSurfel>& surfels() const { return surfels_; }  ///< [count], by page and slot
+  const DeviceArray<ViewSurfel>& surfels() const { return surfels_; }  ///< [count], ordered by page and slot
 
  private:
   Commands& commands_;
@@ -33,7 +33,7 @@ class SignField {
 
   void compute(const Frame& frame, const NeededPaths& needed, const ViewSurfels& surfels);
 
-  /// [3 families][EVENT_PLANES] bit fields; right on the needed paths.
+  /// [3 families][EVENT_PLANES] bit fields; only the bits of needed paths are valid.
   const BitField& events() const { return events_; }
   static std::size_t size(const Grid& grid) { return 3 * EVENT_PLANES * words(grid); }
 
@@ -42,7 +42,7 @@ class SignField {
 
   Commands& commands_;
   Lists& lists_;
-  DeviceArray<cl_uint> tile_begin_, tile_cursor_, tile_surfels_;  ///< which surfels touch each tile of the grid
+  DeviceArray<cl_uint> tile_begin_, tile_cursor_, tile_surfels_;  ///< lists of the surfels that touch each tile of the grid
   BitField events_;
 };
 

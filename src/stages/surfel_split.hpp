@@ -1,4 +1,4 @@
-/// Split of surfels that are large for this view - paper 3.4; kernels/stages/4_split.cl.
+/// Split of surfels that are too large for this view - paper 3.4; kernels/stages/4_split.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"
@@ -12,9 +12,9 @@ class SurfelSplit {
  public:
   SurfelSplit(Commands& commands, Lists& lists);
 
-  /// Puts smaller surfels in the place of large ones. What the visit has found of the map is out of date then.
+  /// Replaces large surfels by smaller ones. Candidates and SurfelVisit must run again after that.
   /// @param large  SurfelVisit::large()
-  /// @return surfels that this adds to the map
+  /// @return number of surfels that the map has gained
   std::size_t split(const Frame& frame, const BitField& large, SurfelMap& map);
 
   const NewSurfels& children() const { return children_; }

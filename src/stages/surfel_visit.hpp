@@ -1,5 +1,5 @@
-/// The pass over the map's surfels around the view; kernels/stages/3_visit.cl. It says which surfels the grid sees, which of them are too
-/// large - paper 3.4 -, which are to be removed - eq. (12) - and, in the map's marks of changes, which are to be labelled.
+/// The pass over the surfels around the view; kernels/stages/3_visit.cl. It finds the surfels that the grid sees, those of them that are
+/// too large - paper 3.4 - and those to be removed - eq. (12). Surfels to be labelled are marked as changed in the map.
 #pragma once
 
 #include "map/surfel_map.hpp"
@@ -11,14 +11,14 @@ namespace frontier_surfels {
 class SurfelVisit {
  public:
   struct Found {
-    std::size_t in_view = 0, large = 0, removed = 0;  ///< surfels
+    std::size_t in_view = 0, large = 0, removed = 0;  ///< numbers of surfels
   };
 
   explicit SurfelVisit(Commands& commands);
 
-  /// Candidates lose the voxels of surfels that stay. Nothing leaves the map yet.
+  /// Clears the candidates in the voxels of surfels that stay. No surfel leaves the map yet.
   /// @param observed, column_end  of ObservedSpace
-  /// @param candidates            of this frame; Candidates::find() has set counters() to zero
+  /// @param candidates            of this frame; Candidates::find() must have set counters() to zero
   Found visit(const Frame& frame, const Camera& camera, const BitField& observed, const DeviceArray<cl_int>& column_end,
               const RecentViews& views, SurfelMap& map, Candidates& candidates);
 

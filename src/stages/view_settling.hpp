@@ -1,4 +1,4 @@
-/// Recent views - our addition to the paper: candidates that a kept view knows are settled; kernels/stages/5_recent_views.cl.
+/// Recent views - our addition to the paper: candidates that a kept view has seen are known, and settled; kernels/stages/5_recent_views.cl.
 #pragma once
 
 #include "stages/candidates.hpp"
@@ -10,10 +10,11 @@ class ViewSettling {
  public:
   explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands) {}
 
-  /// Takes those candidates off whose centre a kept view has seen.
+  /// Clears the candidates whose centre a kept view has seen.
   void settle(const Frame& frame, const Camera& camera, RecentViews& views, Candidates& candidates);
 
-  /// [tiles of the grid][groups of VIEW_GROUP views]: of tiles with candidates left, a bit for each view that may know something near them.
+  /// [tiles of the grid][groups of VIEW_GROUP views]: a bit for each view that may know something near the candidates left in a tile. Tiles
+  /// without candidates have no valid bits.
   const DeviceArray<cl_ushort>& tile_views() const { return tile_views_; }
 
  private:
