@@ -38,10 +38,10 @@ endif()
 ")
   endif()
   set(tools_need)
-  set(libraries frontier_surfels)
+  set(exported_libraries frontier_surfels)
   if(FRONTIER_SURFELS_TOOLS)
     set(tools_need rosbag_storage)
-    list(APPEND libraries frontier_surfels_scoring)
+    list(APPEND exported_libraries frontier_surfels_scoring)
   endif()
   find_package(catkin REQUIRED COMPONENTS cv_bridge diagnostic_updater geometry_msgs image_geometry image_transport message_generation
     nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros visualization_msgs ${tools_need})
@@ -50,7 +50,7 @@ endif()
   generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
   catkin_package(
     INCLUDE_DIRS include
-    LIBRARIES ${libraries}
+    LIBRARIES ${exported_libraries}
     CATKIN_DEPENDS geometry_msgs message_runtime sensor_msgs std_msgs
     CFG_EXTRAS frontier_surfels-extras.cmake)
   set(INSTALL_PROGRAMS_TO ${CATKIN_PACKAGE_BIN_DESTINATION})
