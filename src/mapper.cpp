@@ -9,12 +9,14 @@
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
+#include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
 #include "stages/observed_space.hpp"
+#include "stages/remembering.hpp"
 #include "stages/removal.hpp"
 #include "stages/surfel_split.hpp"
 #include "stages/surfel_visit.hpp"
@@ -24,6 +26,8 @@
 
 namespace frontier_surfels {
 namespace {
+
+constexpr double kSeenSpacing = 2.5;  // of the points that are remembered, unless a parameter says: edges of the smallest voxels
 
 using Clock = std::chrono::steady_clock;
 
@@ -54,6 +58,7 @@ struct Mapper::Impl {
         commands(choose_device(config)),
         lists(commands),
         map(commands, lists, config),
+        seen(commands, map.block_size()),
         views(commands, config),
         cameras(commands, config),
         observed(commands),
@@ -62,7 +67,8 @@ struct Mapper::Impl {
         splitting(commands, lists),
         settling(commands),
         list(commands, lists),
-        creation(commands, lists) {
+        creation(commands, lists),
+        remembering(commands) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map);
     views.clear(archive->empty());
@@ -82,6 +88,7 @@ struct Mapper::Impl {
   Commands commands;
   Lists lists;
   SurfelMap map;
+  SeenPoints seen;
   RecentViews views;
   Cameras cameras;
 
@@ -94,6 +101,7 @@ struct Mapper::Impl {
   CandidateList list;
   std::optional<KnownSpace> known_space;  ///< made by the first frame that needs it
   Creation creation;
+  Remembering remembering;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::uint64_t sequence = 0;
@@ -138,14 +146,14 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   }
 
   // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
-  settling.settle(frame, camera, views, candidates);
+  settling.settle(frame, camera, views, seen, candidates);
   list.list(frame, camera, observed.bits(), candidates);
   close_thin_gaps(commands, frame, camera, observed.column_end(), views, settling.tile_views(), list, candidates);
 
   // Known space K~ from the surfels, for the candidates that are left - 3.2, Algorithm 1, eq. (5)-(8). It is not needed as long as no view
   // has been forgotten: what no view has seen is unknown then
   const BitField* known = nullptr;
-  if (!views.complete()) {
+  if (!config.seen_points && !views.complete()) {
     if (!known_space) known_space.emplace(commands, lists);
     known = &known_space->compute(frame, visit.in_view(), candidates, map);
   }
@@ -157,7 +165,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   // Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16)
   remove_surfels(commands, visit.removed(), found.removed, map);
   report.removed = found.removed;
-  creation.create(frame, camera, views, settling.tile_views(), list, map);
+  creation.create(frame, camera, views, settling.tile_views(), seen, list, map);
 
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
@@ -180,7 +188,9 @@ Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry
   unfinished = number;
   camera.set_image(image);
   views.set_current(image, T_world_camera);
-  return make_frame(camera, map.window(), views, limits);
+  seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : kSeenSpacing * camera.grid().delta_min);
+  seen.open_window(map.window());
+  return make_frame(camera, map.window(), views, seen, limits);
 }
 
 /// Finds the candidates, and then visits the surfels, which clears the candidates in their voxels.
@@ -206,6 +216,7 @@ void Mapper::Impl::finish_frame(Report& report) {
   finish_pages(unfinished);
   if (archive) archive->save_some(unfinished);
   report.view_kept = views.keep_current();
+  if (config.seen_points && views.forgotten()) remembering.remember(*views.forgotten(), views, map.block_size(), seen);
   report.stages = commands.take_times();
   unfinished = 0;
   sequence = report.sequence;
@@ -263,6 +274,7 @@ void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels) {
   map.replace(surfels, static_cast<std::uint32_t>(sequence + 1));
   ++sequence;
   views.clear(map.size() == 0);
+  seen.clear();
   if (!archive) return;
   archive->clear();
   archive->save_some(static_cast<std::uint32_t>(sequence));

@@ -36,6 +36,8 @@ struct Config {
   int recent_views = 700;
   double recent_view_distance = 0.005;
   double recent_view_angle = 0.4;
+  bool seen_points = true;
+  double seen_spacing = 0;
 
   // Removal, creation and labels (paper 3.4, 3.5)
   bool remove_buried = true;
@@ -107,6 +109,12 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"recent_view_angle", "deg",
                   "a view is kept if the camera has turned this much from every kept view, or moved by recent_view_distance", 0, 180},
         config.recent_view_angle);
+
+  field(FieldInfo{"seen_points", "",
+                  "whether what views have seen is remembered when they are no longer kept; false: the paper's known space decides then"},
+        config.seen_points);
+  field(FieldInfo{"seen_spacing", "m", "largest distance of the points that are remembered; 0: follows the smallest voxels", 0, 1},
+        config.seen_spacing);
 
   group = "Removal, creation and labels";
   field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);

@@ -85,6 +85,25 @@ namespace frontier_surfels {
 #define VIEW_LANE_FIRST_PIXEL 18  // bits of a uint
 #define VIEW_LANE_FIELDS 19
 
+// Seen points (common/seen_points.cl) ----------------------------------------------------------------------------------------------------
+
+// Points of a brick along an edge, a power of two, and the words of its points.
+#define SEEN_BRICK 16
+#define SEEN_BRICK_SHIFT 4
+#define SEEN_WORDS 64
+
+// Bricks that stand for those without any seen point, and for those where all points are seen.
+#define SEEN_BRICK_EMPTY 0
+#define SEEN_BRICK_FULL 1
+
+// How many points of a brick, or of a box, are seen.
+#define SEEN_NONE 0
+#define SEEN_MIXED 1
+#define SEEN_ALL 2
+
+// More bricks around the candidates of a tile are not looked at to find out whether all are alike.
+#define SEEN_MOST_BRICKS 64
+
 // Numbers of the method ------------------------------------------------------------------------------------------------------------------
 // Those that depend on parameters, or that the host needs as well, are in Limits below.
 
@@ -106,6 +125,9 @@ namespace frontier_surfels {
 #define SLIDE_STEP 0.1f
 #define SLIDE_STEPS 4
 #define VIEW_BOX_MARGIN 0.55f
+
+// A point was seen before if more than this share of the lattice points around it was, weighted trilinearly. - Ours
+#define SEEN_SHARE 0.25f
 
 // PROBES candidates of a tile show which kept views should be asked first. Then FIRST_VIEWS are asked before the candidates left are listed
 // anew, then twice as many and so on. Both decide only how long it takes. - Ours
@@ -216,6 +238,7 @@ typedef struct {
   Transform T_camera_local, T_local_camera;  // local: the window's frame
   View own_view;                             // of this frame, as its own camera sees it
   SHARED_INT has_color;
+  SHARED_INT has_seen, seen_shift;  // is any point of the lattice seen?  log2 of the bricks along a block's edge
 } Frame;
 
 #ifndef __OPENCL_VERSION__
@@ -225,7 +248,7 @@ static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 14 * 4, "Limits must have no padding");
-static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 1) * 4, "Frame must have no padding");
+static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 3) * 4, "Frame must have no padding");
 }  // namespace frontier_surfels
 #endif
 

@@ -33,8 +33,11 @@ INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* vi
 
 // Positions of new surfels in their voxels: they slide along their normals until they are near the boundary, by whole steps. A step is left
 // in hand before what this view or a kept one knows, and a surfel that has known space at front_probe before it does not lose it.
-INLINE Points slide_to_boundary(const Grid* g, const Limits* limits, const View* view, const ViewsAround* around,
-                                __global const ushort* depths, Voxels v, Points center, Points normal, intv asked) {
+INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, __global const ushort* depths, Voxels v,
+                                Points center, Points normal, intv asked) {
+  const Grid* g = &f->grid;
+  const Limits* limits = &f->limits;
+  const View* view = &f->own_view;
   const floatv voxel = voxel_size(g, center.z);
   const Points forward = scaled(SLIDE_STEP * voxel, normal), ahead = scaled(limits->front_probe * voxel, normal);
   const intv has_front = own_view_knows(view, depths, add_scaled(center, 1.0f, ahead), asked);
@@ -51,6 +54,7 @@ INLINE Points slide_to_boundary(const Grid* g, const Limits* limits, const View*
   while (any_lane(open)) {
     intv known = any_view_knows(around, depths, add_scaled(center, convert_floatv(steps + 1), forward), open);
     known |= any_view_knows(around, depths, add_scaled(center, convert_floatv(steps), forward), open & ~known);
+    if (f->has_seen) known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
     steps += known;
     open = known & MARK(steps > 0);
   }
@@ -58,11 +62,13 @@ INLINE Points slide_to_boundary(const Grid* g, const Limits* limits, const View*
 }
 
 // One work item handles a chunk of LANES new surfels.
-//   in  created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
+//   in  slots, tables, bricks: of the seen points (common/seen_points.cl)
+//       created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
 //       views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this frame's among them
 //   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
 __kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
-                             __global const ushort* depths, __global const float* layer_depth, __global const int* created, const int count,
+                             __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
+                             __global const int* tables, __global const int* bricks, __global const int* created, const int count,
                              __global const int* voxels, __global const int* around, __global const float* directions,
                              __global uint4* new_surfels, __global int* new_cells) {
   const int chunk = get_global_id(0);
@@ -77,7 +83,8 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
     find_views_around(&f.grid, views, tile_views, view_groups, v, &near);
     normal = surfel_normals(&f.grid, &f.limits, &f.own_view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist,
                             &ragged);
-    p = slide_to_boundary(&f.grid, &f.limits, &f.own_view, &near, depths, v, center, normal, exist);
+    const SeenPoints seen = {slots, tables, bricks};
+    p = slide_to_boundary(&f, &near, &seen, depths, v, center, normal, exist);
   }
   const floatv radius = f.limits.create_radius * voxel_size(&f.grid, center.z);
   const uintv attributes = ragged ? (uintv)(SURFEL_RAGGED) : (uintv)(0);

@@ -192,19 +192,45 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
   }
 }
 
+// Drops a tile's candidates that lie in space that was seen before.
+//   box: around them
+INLINE void ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __global const float* layer_depth, const Box* box,
+                       __local Tile* own) {
+  const int item = get_local_id(0), items = get_local_size(0), in_box = seen_in_box(f, seen, box);
+  if (in_box == SEEN_NONE) return;
+  const uint chunks = in_box == SEEN_ALL ? 0 : open_chunks(&f->grid, tile, layer_depth, own);
+  for (uint n = 0; n < chunks; ++n) {
+    const int chunk = own->chunks[n * items + item];
+    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
+    const intv open = lane_marks(own->open[chunk]);
+    own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, seen, center, open));
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0) {
+    if (in_box == SEEN_ALL)
+      own->entry_count = 0;
+    else
+      drop_settled(own);
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+
 // One work-group has the tiles of a word of VIEW_TILE x VIEW_TILE columns, 64 / VIEW_TILE_K tiles one above the other: group
 // (tile_j words_k + w) tiles_i + tile_i.
 //   in  views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
+//       slots, tables, bricks: of the seen points (common/seen_points.cl)
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
 //       near them
 //   i/o candidates: bit field by tiles: those that a view knows are cleared
 __kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
-                                __global const ushort* depths, __global const float* layer_depth, __global ushort* tile_views,
+                                __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
+                                __global const int* tables, __global const int* bricks, __global ushort* tile_views,
                                 __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
   const int group = get_group_id(0), tiles_i = grid_tiles(f.grid.size_i);
   __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
+  const SeenPoints seen = {slots, tables, bricks};
   __local Tile own;
   load_words(own_candidates, &own);
   if (own.layers == 0) return;
@@ -218,6 +244,13 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&f.grid, tile, layer_depth, views, depths, &own);
+    if (own.entry_count != 0) {
+      if (item == 0) keep_entries(&own, tile);
+      barrier(CLK_LOCAL_MEM_FENCE);
+      Box box;
+      find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
+      if (f.has_seen) ask_memory(&f, &seen, tile, layer_depth, &box, &own);
+    }
     if (own.entry_count != 0) {
       if (item == 0) keep_entries(&own, tile);
       barrier(CLK_LOCAL_MEM_FENCE);

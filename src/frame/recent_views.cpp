@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 namespace frontier_surfels {
 namespace {
@@ -11,19 +12,20 @@ namespace {
 /// A depth in steps, rounded down, so that nothing counts as seen that was not. z_max may be one step more than 16 bits hold.
 cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
 
-/// The largest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
-std::vector<float> find_block_depths(const WorkingImage& image) {
+/// Largest or smallest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
+/// @param choose  std::max or std::min
+template <typename Choose>
+std::vector<float> find_block_depths(const WorkingImage& image, Choose choose) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
-  const int columns = (width + VIEW_BLOCK - 1) / VIEW_BLOCK, rows = (height + VIEW_BLOCK - 1) / VIEW_BLOCK;
-  std::vector<float> blocks(static_cast<std::size_t>(columns) * rows, 0.0F), deepest(columns * VIEW_BLOCK);
-  for (int row = 0; row < rows; ++row) {
-    std::fill(deepest.begin(), deepest.end(), 0.0F);
-    for (int t = row * VIEW_BLOCK; t < std::min((row + 1) * VIEW_BLOCK, height); ++t) {
+  std::vector<float> blocks;
+  for (int row = 0; row < height; row += VIEW_BLOCK) {
+    std::vector<float> of_columns(width);
+    for (int t = row; t < std::min(row + VIEW_BLOCK, height); ++t) {
       const float* depth = &image.depth[static_cast<std::size_t>(t) * width];
-      for (int s = 0; s < width; ++s) deepest[s] = std::max(deepest[s], std::abs(depth[s]));
+      for (int s = 0; s < width; ++s) of_columns[s] = t == row ? std::abs(depth[s]) : choose(of_columns[s], std::abs(depth[s]));
     }
-    for (int column = 0; column < columns; ++column)
-      blocks[row * columns + column] = *std::max_element(&deepest[column * VIEW_BLOCK], &deepest[column * VIEW_BLOCK] + VIEW_BLOCK);
+    for (int column = 0; column < width; column += VIEW_BLOCK)
+      blocks.push_back(std::accumulate(&of_columns[column], &of_columns[0] + std::min(column + VIEW_BLOCK, width), of_columns[column], choose));
   }
   return blocks;
 }
@@ -106,17 +108,22 @@ RecentViews::RecentViews(Commands& commands, const Config& config)
 
 void RecentViews::clear(bool map_is_empty) {
   kept_.clear();
+  forgotten_.reset();
   complete_ = map_is_empty && config_.recent_views > 0;
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
   const auto per_step = static_cast<float>(1 / depth_step_);
   std::vector<cl_ushort> depths = by_patches(image, per_step);
-  for (const float depth : find_block_depths(image)) depths.push_back(to_steps(depth, per_step));
+  const std::vector<float> largest = find_block_depths(image, [](float a, float b) { return std::max(a, b); }),
+                           smallest = find_block_depths(image, [](float a, float b) { return std::min(a, b); });
+  for (const float depth : largest) depths.push_back(to_steps(depth, per_step));
+  for (const float depth : smallest) depths.push_back(to_steps(depth, per_step));
   // A room has whole patches: those of the next room must not cross cache lines, and pixels are read in pairs.
   depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
   if (depths.size() > room_size_) enlarge_rooms(depths.size());
-  current_ = {image.intrinsics, T_world_camera, free_room()};
+  current_ = {image.intrinsics, T_world_camera, free_room(), *std::max_element(largest.begin(), largest.end())};
+  forgotten_.reset();
   depths_.send(std::move(depths), current_.room * room_size_);
 }
 
@@ -177,13 +184,26 @@ bool RecentViews::differs_enough() const {
 }
 
 bool RecentViews::keep_current() {
-  if (config_.recent_views == 0 || !differs_enough()) return false;
-  if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
-    kept_.pop_back();
+  const auto forget = [this](const Kept& view) {
     complete_ = false;
+    if (view.deepest > 0) forgotten_ = ForgottenView{view.intrinsics, view.T_world_camera, view.room, view.deepest};
+  };
+  if (config_.recent_views == 0 || !differs_enough()) {
+    const bool complete = complete_;
+    forget(current_);
+    complete_ = complete;  // the paper's method takes a view that adds little for one that adds nothing
+    return false;
+  }
+  if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
+    forget(kept_.back());
+    kept_.pop_back();
   }
   kept_.push_front(current_);
   return true;
+}
+
+View RecentViews::view_of(const ForgottenView& view, const Eigen::Isometry3d& T_camera_local) const {
+  return to_view({view.intrinsics, view.T_world_camera, view.room, view.deepest}, T_camera_local);
 }
 
 }  // namespace frontier_surfels

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "common/shared.h"
@@ -19,6 +20,14 @@ Transform to_transform(const Eigen::Isometry3d& T);
 /// conversion back is exact.
 double depth_step_for(double z_max);
 
+/// A view whose image will soon be replaced by another one.
+struct ForgottenView {
+  Intrinsics intrinsics;
+  Eigen::Isometry3d T_world_camera;
+  std::size_t room = 0;  ///< of its image
+  double deepest = 0;    ///< largest depth of its image [m]
+};
+
 class RecentViews {
  public:
   RecentViews(Commands& commands, const Config& config);
@@ -33,6 +42,11 @@ class RecentViews {
 
   /// Keeps the current view if its camera or pose differs enough from every kept view. @return whether it was kept
   bool keep_current();
+
+  /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on the
+  /// device until the next set_current(). None if it has no depth, or if a kept view was not replaced.
+  const std::optional<ForgottenView>& forgotten() const { return forgotten_; }
+  View view_of(const ForgottenView& view, const Eigen::Isometry3d& T_camera_local) const;  ///< as seen from the frame `local`
 
   /// Are all views that were kept since the map was empty still kept? Then the kept views alone know all known space.
   bool complete() const { return complete_; }
@@ -52,6 +66,7 @@ class RecentViews {
     Intrinsics intrinsics;
     Eigen::Isometry3d T_world_camera;
     std::size_t room = 0;  ///< row of depths_
+    double deepest = 0;    ///< largest depth [m]
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool differs_enough() const;
@@ -62,12 +77,13 @@ class RecentViews {
   double depth_step_;          ///< [m]
   std::size_t room_size_ = 0;  ///< elements that the largest image so far takes
   Kept current_;
+  std::optional<ForgottenView> forgotten_;
   std::deque<Kept> kept_;  ///< newest first
   bool complete_;
   SentArray<View> views_;
   SentArray<float> view_lanes_;
   /// [recent_views + 1][room_size_], in steps of depth_step_: images of the kept views and of the current one. Behind each image follows
-  /// the largest depth of each block of VIEW_BLOCK x VIEW_BLOCK pixels; the view knows nothing beyond that depth.
+  /// the largest depth of each block of VIEW_BLOCK x VIEW_BLOCK pixels, and then the smallest one, which is 0 if a pixel has none.
   DeviceArray<cl_ushort> depths_;
 };
 

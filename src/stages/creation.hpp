@@ -20,7 +20,7 @@ class Creation {
 
   /// Makes surfels of the chosen candidates and puts them into the map.
   /// @param tile_views  ViewSettling::tile_views()
-  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views,
+  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views, const SeenPoints& seen,
               const CandidateList& list, SurfelMap& map);
 
   std::size_t count() const { return count_; }

@@ -5,12 +5,13 @@
 #include "frame/camera.hpp"
 #include "frame/recent_views.hpp"
 #include "map/map_window.hpp"
+#include "map/seen_points.hpp"
 #include "opencl/commands.hpp"
 
 namespace frontier_surfels {
 
 /// Makes the structure that every kernel of a frame is given (kernels/common/shared.h).
-Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const Limits& limits);
+Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints& seen, const Limits& limits);
 
 /// A bit for each voxel of the grid (kernels/common/grid.cl says where), or for each surfel of the window's pages.
 using BitField = DeviceArray<cl_ulong>;

@@ -10,8 +10,8 @@ class ViewSettling {
  public:
   explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands) {}
 
-  /// Clears the candidates whose centre a kept view has seen.
-  void settle(const Frame& frame, const Camera& camera, RecentViews& views, Candidates& candidates);
+  /// Clears the candidates whose centre a kept view has seen, or an earlier one by the points that are remembered of it.
+  void settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, Candidates& candidates);
 
   /// [tiles of the grid][groups of VIEW_GROUP views]: a bit for each view that may know something near the candidates left in a tile. Tiles
   /// without candidates have no valid bits.

@@ -1,0 +1,92 @@
+// Seen points: memory of what views that are no longer kept have seen. The world has a lattice of points, with a bit each: has such a view
+// seen this very point?
+//
+// A block of the map has 2^seen_shift bricks along each edge. A brick has SEEN_BRICK^3 points in SEEN_WORDS words of 4 x 4 x 4 points.
+//   slots[cells of the window]: number of the table of the cell's block; table 0 is that of blocks without one, and has only zeros
+//   tables[...][bricks of a block]: number of each brick; in brick 0 no point is seen, and in brick 1 all are
+//   bricks[...][SEEN_WORDS]: word (z 4 + y) 4 + x of a brick, and bit (z 4 + y) 4 + x of a word
+// Point n along an edge of a block is (n + 1/2) spacings from the block's corner.
+
+typedef struct {
+  __global const int* slots;
+  __global const int* tables;
+  __global const int* bricks;  // as 32-bit halves of words
+} SeenPoints;
+
+// Where LANES numbers of points along one axis are: shares of the indices that the three axes add up to.
+typedef struct {
+  intv inside, cell, brick, word, bit;
+} SeenPlace;
+
+//   points: along the axis, from the window's corner;  shift: seen_shift;  size: blocks of the window
+//   cells, axis: strides of this axis - of cells, and its number (0: x, 1: y, 2: z)
+INLINE SeenPlace seen_place(intv points, int shift, int size, int cells, int axis) {
+  const int block = shift + SEEN_BRICK_SHIFT;
+  SeenPlace place;
+  place.inside = MARK((points >= 0) & (points < size << block));
+  const intv n = place.inside ? points : 0;
+  place.cell = (n >> block) * cells;
+  place.brick = (n >> SEEN_BRICK_SHIFT & ((1 << shift) - 1)) << (axis * shift);
+  place.word = (n >> 2 & 3) << (2 * axis);
+  place.bit = (n & 3) << (2 * axis);
+  return place;
+}
+
+// Which of LANES points lie in space that was seen before: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE
+// are seen.
+//   p: camera frame [m];  asked: marks of the points in question
+intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
+  const int shift = f->seen_shift;
+  const float scale = (float)(SEEN_BRICK << shift) / f->window.block_size;
+  const Points q = transformed(&f->T_local_camera, p);
+  const floatv x = q.x * scale - 0.5f, y = q.y * scale - 0.5f, z = q.z * scale - 0.5f;
+  const intv i = floor_int(x), j = floor_int(y), k = floor_int(z);
+  const floatv a = x - convert_floatv(i), b = y - convert_floatv(j), c = z - convert_floatv(k);
+  const int row = f->window.size_x, layer = row * f->window.size_y;
+  const SeenPlace along_x[2] = {seen_place(i, shift, f->window.size_x, 1, 0), seen_place(i + 1, shift, f->window.size_x, 1, 0)};
+  const SeenPlace along_y[2] = {seen_place(j, shift, f->window.size_y, row, 1), seen_place(j + 1, shift, f->window.size_y, row, 1)};
+  const SeenPlace along_z[2] = {seen_place(k, shift, f->window.size_z, layer, 2), seen_place(k + 1, shift, f->window.size_z, layer, 2)};
+  floatv share = 0.0f;
+  for (int n = 0; n < 8; ++n) {
+    const SeenPlace *u = &along_x[n & 1], *v = &along_y[n >> 1 & 1], *t = &along_z[n >> 2];
+    const floatv weight = (n & 1 ? a : 1.0f - a) * (n & 2 ? b : 1.0f - b) * (n & 4 ? c : 1.0f - c);
+    const intv exist = asked & u->inside & v->inside & t->inside;
+    const intv slot = gather_int(seen->slots, exist ? u->cell + v->cell + t->cell : 0);
+    const intv brick = gather_int(seen->tables, (slot << (3 * shift)) + u->brick + v->brick + t->brick);
+    const intv bit = u->bit + v->bit + t->bit;
+    const intv half_word = gather_int(seen->bricks, 2 * (SEEN_WORDS * brick + u->word + v->word + t->word) + (bit >> 5));
+    share += (exist & MARK((half_word >> (bit & 31) & 1) != 0)) ? weight : 0.0f;
+  }
+  return asked & MARK(share > SEEN_SHARE);
+}
+
+// Which of the lattice points around a box are seen: none, some, or all? SEEN_MIXED also where that would take long to find out.
+INLINE int seen_in_box(const Frame* f, const SeenPoints* seen, const Box* box) {
+  const Transform* T = &f->T_local_camera;
+  const float3 c = box->center, h = box->half_size;
+  const float scale = (float)(SEEN_BRICK << f->seen_shift) / f->window.block_size;
+  const float3 center = (float3)(T->r00 * c.x + T->r01 * c.y + T->r02 * c.z + T->t0, T->r10 * c.x + T->r11 * c.y + T->r12 * c.z + T->t1,
+                                 T->r20 * c.x + T->r21 * c.y + T->r22 * c.z + T->t2);
+  const float3 half_size = (float3)(fabs(T->r00) * h.x + fabs(T->r01) * h.y + fabs(T->r02) * h.z,
+                                    fabs(T->r10) * h.x + fabs(T->r11) * h.y + fabs(T->r12) * h.z,
+                                    fabs(T->r20) * h.x + fabs(T->r21) * h.y + fabs(T->r22) * h.z);
+  const float3 low = (center - half_size) * scale - 1.0f, high = (center + half_size) * scale + 1.0f;  // half a point more than needed
+  const int points_shift = SEEN_BRICK_SHIFT + f->seen_shift, sides = (1 << f->seen_shift) - 1;
+  const int3 size = (int3)(f->window.size_x, f->window.size_y, f->window.size_z) << points_shift;
+  if (low.x < 0.0f || low.y < 0.0f || low.z < 0.0f || high.x >= (float)size.x || high.y >= (float)size.y || high.z >= (float)size.z)
+    return SEEN_MIXED;
+  const int3 first = convert_int3(low) >> SEEN_BRICK_SHIFT, last = convert_int3(high) >> SEEN_BRICK_SHIFT, extent = last - first + 1;
+  if (extent.x * extent.y * extent.z > SEEN_MOST_BRICKS) return SEEN_MIXED;
+  bool none = true, all = true;
+  for (int z = first.z; z <= last.z; ++z)
+    for (int y = first.y; y <= last.y; ++y)
+      for (int x = first.x; x <= last.x; ++x) {
+        const int cell = ((z >> f->seen_shift) * f->window.size_y + (y >> f->seen_shift)) * f->window.size_x + (x >> f->seen_shift);
+        const int brick = (((z & sides) << f->seen_shift | (y & sides)) << f->seen_shift) | (x & sides);
+        const int entry = seen->tables[(seen->slots[cell] << (3 * f->seen_shift)) + brick];
+        none = none && entry == SEEN_BRICK_EMPTY;
+        all = all && entry == SEEN_BRICK_FULL;
+        if (!none && !all) return SEEN_MIXED;
+      }
+  return none ? SEEN_NONE : SEEN_ALL;
+}
