@@ -165,7 +165,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   // Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16)
   remove_surfels(commands, visit.removed(), found.removed, map);
   report.removed = found.removed;
-  creation.create(frame, camera, views, settling.tile_views(), seen, list, map);
+  creation.create(frame, camera, views, seen, settling, list, map);
 
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);

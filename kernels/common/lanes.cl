@@ -82,7 +82,6 @@ INLINE void store_runs_of_8(ulongv words, __global ulong* to, int stride, bool m
 // Item n of those that fill a bit field puts the bits of its lanes into bits LANES n ... LANES (n + 1) - 1 of the field. Every item must do
 // so. At width 1 several items share a word: there the field must be zero before.
 INLINE void store_lane_bits(uint bits, uint item, __global uint* field) { ((__global ushort*)field)[item] = (ushort)bits; }
-INLINE uint load_lane_bits(uint item, __global const uint* field) { return ((__global const ushort*)field)[item]; }
 
 // A word of 64 bits that the 64 / LANES items of a work-group that have its lanes put together in local memory.
 typedef struct {
@@ -104,7 +103,6 @@ INLINE void store_runs_of_8(ulongv words, __global ulong* to, int stride, bool m
 INLINE void store_lane_bits(uint bits, uint item, __global uint* field) {
   if (bits != 0) atomic_or(&field[item / 32], bits << (item % 32));
 }
-INLINE uint load_lane_bits(uint item, __global const uint* field) { return field[item / 32] >> (item % 32) & 1; }
 
 typedef struct {
   uint halves[2];

@@ -13,23 +13,31 @@ typedef struct {
   __global const int* bricks;  // as 32-bit halves of words
 } SeenPoints;
 
-// Where LANES numbers of points along one axis are: shares of the indices that the three axes add up to.
+// Where a number of points along one axis is: shares of the indices that the three axes add up to.
 typedef struct {
   intv inside, cell, brick, word, bit;
 } SeenPlace;
 
-//   points: along the axis, from the window's corner;  shift: seen_shift;  size: blocks of the window
-//   cells, axis: strides of this axis - of cells, and its number (0: x, 1: y, 2: z)
-INLINE SeenPlace seen_place(intv points, int shift, int size, int cells, int axis) {
+//   points: along the axis, from the window's corner;  shift: seen_shift;  blocks: of the window
+//   stride: of the axis among the window's cells;  axis: 0, 1, 2 for x, y, z
+INLINE SeenPlace seen_place(intv points, int shift, int blocks, int stride, int axis) {
   const int block = shift + SEEN_BRICK_SHIFT;
   SeenPlace place;
-  place.inside = MARK((points >= 0) & (points < size << block));
+  place.inside = MARK((points >= 0) & (points < blocks << block));
   const intv n = place.inside ? points : 0;
-  place.cell = (n >> block) * cells;
+  place.cell = (n >> block) * stride;
   place.brick = (n >> SEEN_BRICK_SHIFT & ((1 << shift) - 1)) << (axis * shift);
   place.word = (n >> 2 & 3) << (2 * axis);
   place.bit = (n & 3) << (2 * axis);
   return place;
+}
+
+// The bricks that lattice points are in; brick 0 where a point is beyond the window.
+INLINE intv bricks_at(const SeenPoints* seen, int shift, const SeenPlace* x, const SeenPlace* y, const SeenPlace* z) {
+  const intv inside = x->inside & y->inside & z->inside;
+  const intv slot = gather_int(seen->slots, inside ? x->cell + y->cell + z->cell : 0);
+  const intv brick = gather_int(seen->tables, (slot << (3 * shift)) + x->brick + y->brick + z->brick);
+  return inside ? brick : SEEN_BRICK_EMPTY;
 }
 
 // Which of LANES points lie in space that was seen before: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE
@@ -41,23 +49,35 @@ intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
   const Points q = transformed(&f->T_local_camera, p);
   const floatv x = q.x * scale - 0.5f, y = q.y * scale - 0.5f, z = q.z * scale - 0.5f;
   const intv i = floor_int(x), j = floor_int(y), k = floor_int(z);
-  const floatv a = x - convert_floatv(i), b = y - convert_floatv(j), c = z - convert_floatv(k);
   const int row = f->window.size_x, layer = row * f->window.size_y;
-  const SeenPlace along_x[2] = {seen_place(i, shift, f->window.size_x, 1, 0), seen_place(i + 1, shift, f->window.size_x, 1, 0)};
-  const SeenPlace along_y[2] = {seen_place(j, shift, f->window.size_y, row, 1), seen_place(j + 1, shift, f->window.size_y, row, 1)};
-  const SeenPlace along_z[2] = {seen_place(k, shift, f->window.size_z, layer, 2), seen_place(k + 1, shift, f->window.size_z, layer, 2)};
+  SeenPlace along_x[2], along_y[2], along_z[2];
+  along_x[0] = seen_place(i, shift, f->window.size_x, 1, 0);
+  along_y[0] = seen_place(j, shift, f->window.size_y, row, 1);
+  along_z[0] = seen_place(k, shift, f->window.size_z, layer, 2);
+  const intv first = bricks_at(seen, shift, &along_x[0], &along_y[0], &along_z[0]);
+
+  // Most points have all 8 in one brick, and most of these bricks are uniform.
+  const int last = SEEN_BRICK - 1;
+  const intv together = MARK(((i & last) != last) & ((j & last) != last) & ((k & last) != last));
+  const intv alike = asked & together & MARK(first <= SEEN_BRICK_FULL);
+  const intv known = alike & MARK(first == SEEN_BRICK_FULL), open = asked & ~alike;
+  if (!any_lane(open)) return known;
+
+  along_x[1] = seen_place(i + 1, shift, f->window.size_x, 1, 0);
+  along_y[1] = seen_place(j + 1, shift, f->window.size_y, row, 1);
+  along_z[1] = seen_place(k + 1, shift, f->window.size_z, layer, 2);
+  const bool one_brick = !any_lane(open & ~together);
+  const floatv a = x - convert_floatv(i), b = y - convert_floatv(j), c = z - convert_floatv(k);
   floatv share = 0.0f;
   for (int n = 0; n < 8; ++n) {
     const SeenPlace *u = &along_x[n & 1], *v = &along_y[n >> 1 & 1], *t = &along_z[n >> 2];
     const floatv weight = (n & 1 ? a : 1.0f - a) * (n & 2 ? b : 1.0f - b) * (n & 4 ? c : 1.0f - c);
-    const intv exist = asked & u->inside & v->inside & t->inside;
-    const intv slot = gather_int(seen->slots, exist ? u->cell + v->cell + t->cell : 0);
-    const intv brick = gather_int(seen->tables, (slot << (3 * shift)) + u->brick + v->brick + t->brick);
+    const intv brick = one_brick ? first : bricks_at(seen, shift, u, v, t);
     const intv bit = u->bit + v->bit + t->bit;
     const intv half_word = gather_int(seen->bricks, 2 * (SEEN_WORDS * brick + u->word + v->word + t->word) + (bit >> 5));
-    share += (exist & MARK((half_word >> (bit & 31) & 1) != 0)) ? weight : 0.0f;
+    share += MARK((half_word >> (bit & 31) & 1) != 0) ? weight : 0.0f;
   }
-  return asked & MARK(share > SEEN_SHARE);
+  return known | (open & MARK(share > SEEN_SHARE));
 }
 
 // Which of the lattice points around a box are seen: none, some, or all? SEEN_MIXED also where that would take long to find out.

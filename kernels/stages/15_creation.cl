@@ -33,8 +33,8 @@ INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* vi
 
 // Positions of new surfels in their voxels: they slide along their normals until they are near the boundary, by whole steps. A step is left
 // in hand before what this view or a kept one knows, and a surfel that has known space at front_probe before it does not lose it.
-INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, __global const ushort* depths, Voxels v,
-                                Points center, Points normal, intv asked) {
+INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, bool ask_seen, __global const ushort* depths,
+                                Voxels v, Points center, Points normal, intv asked) {
   const Grid* g = &f->grid;
   const Limits* limits = &f->limits;
   const View* view = &f->own_view;
@@ -54,7 +54,7 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
   while (any_lane(open)) {
     intv known = any_view_knows(around, depths, add_scaled(center, convert_floatv(steps + 1), forward), open);
     known |= any_view_knows(around, depths, add_scaled(center, convert_floatv(steps), forward), open & ~known);
-    if (f->has_seen) known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
+    if (ask_seen) known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
     steps += known;
     open = known & MARK(steps > 0);
   }
@@ -68,7 +68,7 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
 //   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
 __kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
                              __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                             __global const int* tables, __global const int* bricks, __global const int* created, const int count,
+                             __global const int* tables, __global const int* bricks, __global const uchar* tile_seen, __global const int* created, const int count,
                              __global const int* voxels, __global const int* around, __global const float* directions,
                              __global uint4* new_surfels, __global int* new_cells) {
   const int chunk = get_global_id(0);
@@ -84,7 +84,9 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
     normal = surfel_normals(&f.grid, &f.limits, &f.own_view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist,
                             &ragged);
     const SeenPoints seen = {slots, tables, bricks};
-    p = slide_to_boundary(&f, &near, &seen, depths, v, center, normal, exist);
+    bool ask_seen = false;
+    for (int n = 0; n < near.tile_count; ++n) ask_seen = ask_seen || tile_seen[near.tiles[n]] != SEEN_NONE;
+    p = slide_to_boundary(&f, &near, &seen, f.has_seen && ask_seen, depths, v, center, normal, exist);
   }
   const floatv radius = f.limits.create_radius * voxel_size(&f.grid, center.z);
   const uintv attributes = ragged ? (uintv)(SURFEL_RAGGED) : (uintv)(0);

@@ -74,26 +74,42 @@ __kernel void set_seen_bricks(__global const int2* entries, const int count, __g
   if (entry.y > SEEN_BRICK_FULL) bricks[SEEN_WORDS * entry.y + word] = 0;
 }
 
-// One work item handles LANES points of a brick.
+// Words along an edge of the cubes that one work item of see_points handles, and such cubes in a brick: a cube that the view knows nothing of
+// is done with at once.
+#define SEE_EDGE (LANES == 1 ? 1 : 2)
+#define SEE_WORD(w) ((((w) >> 2) * 4 + ((w) >> 1 & 1)) * 4 + ((w) & 1))  // of word w of a cube, from its first one
+#define SEE_CUBES (SEEN_WORDS / (SEE_EDGE * SEE_EDGE * SEE_EDGE))
+
+// One work item handles a cube of words of a brick.
 //   in  seen_by[count]: x, y, z of a brick, counted in bricks from the window's corner, and its number
 //   i/o bricks: the bits of points that the view knows are set
 __kernel void see_points(const Window window, const View view, const int shift, __global const ushort* depths, __global const int4* seen_by,
-                         const int count, __global uint* bricks) {
-  const int items = 64 * SEEN_WORDS / LANES, n = get_global_id(0) / items, part = get_global_id(0) % items;
+                         const int count, __global ulong* bricks) {
+  const int n = get_global_id(0) / SEE_CUBES, cube = get_global_id(0) % SEE_CUBES, edges = 4 / SEE_EDGE;
   if (n >= count) return;
   const int4 brick = seen_by[n];
-  const uint before = load_lane_bits(brick.w * items + part, bricks);
-  const intv open = ~lane_marks(before);
-  if (!any_lane(open)) return;
-  const int word = part / (64 / LANES);
-  const intv point = part % (64 / LANES) * LANES + lane_numbers();
-  const float spacing = seen_spacing(&window, shift);
-  const int3 first = SEEN_BRICK * brick.xyz + 4 * (int3)(word & 3, word >> 2 & 3, word >> 4);
-  const Points p = {convert_floatv(first.x + (point & 3)) * spacing + 0.5f * spacing,
-                    convert_floatv(first.y + (point >> 2 & 3)) * spacing + 0.5f * spacing,
-                    convert_floatv(first.z + (point >> 4)) * spacing + 0.5f * spacing};
-  const uint bits = lane_bits(knows(&view, depths, p, open));
-  if (bits != 0) store_lane_bits(before | bits, brick.w * items + part, bricks);
+  const int3 corner = SEE_EDGE * (int3)(cube % edges, cube / edges % edges, cube / edges / edges);  // [word]
+  __global ulong* words = bricks + SEEN_WORDS * brick.w + (corner.z * 4 + corner.y) * 4 + corner.x;
+  ulong all = ~0ul;
+  for (int w = 0; w < SEE_EDGE * SEE_EDGE * SEE_EDGE; ++w) all &= words[SEE_WORD(w)];
+  if (all == ~0ul) return;
+
+  const float spacing = seen_spacing(&window, shift), half_size = 2.0f * SEE_EDGE * spacing;
+  const int3 first = SEEN_BRICK * brick.xyz + 4 * corner;  // [point]
+  if (cube_in_view(&view, depths, convert_float3(first) * spacing + half_size, half_size) == SEEN_NONE) return;
+  for (int w = 0; w < SEE_EDGE * SEE_EDGE * SEE_EDGE; ++w) {
+    const ulong before = words[SEE_WORD(w)];
+    if (before == ~0ul) continue;
+    const int3 of_word = first + 4 * (int3)(w & 1, w >> 1 & 1, w >> 2);
+    ulong seen = before;
+    for (int bit = 0; bit < 64; bit += LANES) {
+      const intv point = bit + lane_numbers(), open = ~lane_marks((uint)(before >> bit));
+      const Points p = {(convert_floatv(of_word.x + (point & 3)) + 0.5f) * spacing, (convert_floatv(of_word.y + (point >> 2 & 3)) + 0.5f) * spacing,
+                        (convert_floatv(of_word.z + (point >> 4)) + 0.5f) * spacing};
+      seen |= (ulong)lane_bits(knows(&view, depths, p, open)) << bit;
+    }
+    if (seen != before) words[SEE_WORD(w)] = seen;
+  }
 }
 
 // One work item handles a brick: is every point of it seen?

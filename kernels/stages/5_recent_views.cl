@@ -192,12 +192,12 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
   }
 }
 
-// Drops a tile's candidates that lie in space that was seen before.
+// Drops a tile's candidates that lie in space that was seen before. Returns how many of the points near them are seen.
 //   box: around them
-INLINE void ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __global const float* layer_depth, const Box* box,
-                       __local Tile* own) {
+INLINE int ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __global const float* layer_depth, const Box* box,
+                      __local Tile* own) {
   const int item = get_local_id(0), items = get_local_size(0), in_box = seen_in_box(f, seen, box);
-  if (in_box == SEEN_NONE) return;
+  if (in_box == SEEN_NONE) return in_box;
   const uint chunks = in_box == SEEN_ALL ? 0 : open_chunks(&f->grid, tile, layer_depth, own);
   for (uint n = 0; n < chunks; ++n) {
     const int chunk = own->chunks[n * items + item];
@@ -213,6 +213,7 @@ INLINE void ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __glob
       drop_settled(own);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
+  return in_box;
 }
 
 // One work-group has the tiles of a word of VIEW_TILE x VIEW_TILE columns, 64 / VIEW_TILE_K tiles one above the other: group
@@ -221,10 +222,11 @@ INLINE void ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __glob
 //       slots, tables, bricks: of the seen points (common/seen_points.cl)
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
 //       near them
-//   i/o candidates: bit field by tiles: those that a view knows are cleared
+//       tile_seen[tiles_j][tiles_k][tiles_i]: for the same tiles, how many of the lattice points near them are seen
+//   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared
 __kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
                                 __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                                __global const int* tables, __global const int* bricks, __global ushort* tile_views,
+                                __global const int* tables, __global const int* bricks, __global ushort* tile_views, __global uchar* tile_seen,
                                 __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
@@ -249,7 +251,8 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
       barrier(CLK_LOCAL_MEM_FENCE);
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
-      if (f.has_seen) ask_memory(&f, &seen, tile, layer_depth, &box, &own);
+      const int in_box = f.has_seen ? ask_memory(&f, &seen, tile, layer_depth, &box, &own) : SEEN_NONE;
+      if (item == 0) tile_seen[(tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x] = (uchar)in_box;
     }
     if (own.entry_count != 0) {
       if (item == 0) keep_entries(&own, tile);

@@ -6,6 +6,7 @@
 #include "stages/candidates.hpp"
 #include "stages/frame.hpp"
 #include "stages/new_surfels.hpp"
+#include "stages/view_settling.hpp"
 
 namespace frontier_surfels {
 
@@ -19,8 +20,7 @@ class Creation {
   std::size_t filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
 
   /// Makes surfels of the chosen candidates and puts them into the map.
-  /// @param tile_views  ViewSettling::tile_views()
-  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const DeviceArray<cl_ushort>& tile_views, const SeenPoints& seen,
+  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const ViewSettling& settling,
               const CandidateList& list, SurfelMap& map);
 
   std::size_t count() const { return count_; }

@@ -1,6 +1,8 @@
 #include "stages/remembering.hpp"
 
 #include <utility>
+#include <algorithm>
+#include <cstdio>
 
 #include "map/view_blocks.hpp"
 #include "stages/frame.hpp"
@@ -27,7 +29,7 @@ void Remembering::remember(const ForgottenView& forgotten, const RecentViews& vi
   const std::size_t count = blocks.size();
   found_.resize(count * bricks);
   blocks_.send(blocks);
-  commands_.run(stage, "find_seen_bricks", count * bricks, kGroup, around.window, view, static_cast<cl_int>(seen.shift()), views.depths(),
+  commands_.run("find_bricks", "find_seen_bricks", count * bricks, kGroup, around.window, view, static_cast<cl_int>(seen.shift()), views.depths(),
                 blocks_(), static_cast<cl_int>(count), seen.tables(), found_());
   const std::vector<cl_uchar> found = found_.read(count * bricks);
 
@@ -49,10 +51,11 @@ void Remembering::remember(const ForgottenView& forgotten, const RecentViews& vi
     places.emplace_back(table, brick);
   }
   seen.send_entries(stage);
+  { static int n = 0; if (++n % 50 == 0) fprintf(stderr, "blocks %zu bricks asked %zu all %zu; bricks %zu tables %zu bytes %zu\n", count, asked.size(), (size_t)std::count(found.begin(), found.end(), 2), seen.bricks(), seen.blocks(), seen.bytes()); }
   if (asked.empty()) return;
   const auto asked_count = static_cast<cl_int>(asked.size());
   seen_by_.send(std::move(asked));
-  commands_.run(stage, "see_points", static_cast<std::size_t>(asked_count) * 64 * SEEN_WORDS / commands_.lanes(), kGroup, around.window, view,
+  commands_.run("see_points", "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8), commands_.device().heavy_group(), around.window, view,
                 static_cast<cl_int>(seen.shift()), views.depths(), seen_by_(), asked_count, seen.brick_words());
   full_.resize(asked_count);
   commands_.run(stage, "find_full_bricks", asked_count, kGroup, seen_by_(), asked_count, seen.brick_words(), full_());

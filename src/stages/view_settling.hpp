@@ -8,7 +8,7 @@ namespace frontier_surfels {
 
 class ViewSettling {
  public:
-  explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands) {}
+  explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands), tile_seen_(commands) {}
 
   /// Clears the candidates whose centre a kept view has seen, or an earlier one by the points that are remembered of it.
   void settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, Candidates& candidates);
@@ -17,9 +17,13 @@ class ViewSettling {
   /// without candidates have no valid bits.
   const DeviceArray<cl_ushort>& tile_views() const { return tile_views_; }
 
+  /// [tiles of the grid]: how many of the lattice points near the candidates left in a tile were seen before (SEEN_NONE ...); 
+  const DeviceArray<cl_uchar>& tile_seen() const { return tile_seen_; }
+
  private:
   Commands& commands_;
   DeviceArray<cl_ushort> tile_views_;
+  DeviceArray<cl_uchar> tile_seen_;
 };
 
 }  // namespace frontier_surfels
