@@ -9,6 +9,7 @@
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
+#include "map/seen_fill.hpp"
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
@@ -26,8 +27,6 @@
 
 namespace frontier_surfels {
 namespace {
-
-constexpr double kSeenSpacing = 2.5;  // of the points that are remembered, unless a parameter says: edges of the smallest voxels
 
 using Clock = std::chrono::steady_clock;
 
@@ -70,7 +69,7 @@ struct Mapper::Impl {
         creation(commands, lists),
         remembering(commands) {
     if (config.map_folder.empty()) return;
-    archive = std::make_unique<MapArchive>(config, map);
+    archive = std::make_unique<MapArchive>(config, map, seen);
     views.clear(archive->empty());
   }
 
@@ -80,7 +79,7 @@ struct Mapper::Impl {
   void finish_pages(std::uint32_t number);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(Report& report);
-  void begin_map(const std::vector<Surfel>& surfels);
+  void begin_map(const SavedMap& saved);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
 
   const Config config;
@@ -201,7 +200,7 @@ SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera&
 
 void Mapper::Impl::finish_pages(std::uint32_t number) {
   const std::vector<BlockKey> shrunk = map.finish_frame("labels", number);
-  if (archive) archive->note_shrunk(shrunk);
+  if (archive) archive->note_changed(shrunk);
 }
 
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
@@ -214,9 +213,12 @@ void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T
 
 void Mapper::Impl::finish_frame(Report& report) {
   finish_pages(unfinished);
-  if (archive) archive->save_some(unfinished);
   report.view_kept = views.keep_current();
-  if (config.seen_points && views.forgotten()) remembering.remember(*views.forgotten(), views, map.block_size(), seen);
+  if (config.seen_points && views.forgotten()) {
+    const std::vector<BlockKey> changed = remembering.remember(*views.forgotten(), views, map.block_size(), seen);
+    if (archive) archive->note_changed(changed);
+  }
+  if (archive) archive->save_some(unfinished);
   report.stages = commands.take_times();
   unfinished = 0;
   sequence = report.sequence;
@@ -224,6 +226,7 @@ void Mapper::Impl::finish_frame(Report& report) {
   pages_changed = false;
   report.surfels = map.size();
   report.map_bytes = map.bytes();
+  report.seen_bytes = seen.bytes();
   report.device_bytes = device_bytes();
 }
 
@@ -246,19 +249,18 @@ Changes Mapper::changes(std::uint64_t since) const {
   return changes;
 }
 
-void Mapper::save(const std::string& path) const {
-  std::vector<Surfel> all = surfels();
-  if (impl_->archive) {
-    const std::vector<Surfel> stored = impl_->archive->stored();
-    all.insert(all.end(), stored.begin(), stored.end());
-  }
-  write_map(path, all);
+SavedMap Mapper::saved_map() const {
+  SavedMap map = on_device([&] { return SavedMap{impl_->map.download(), impl_->seen.saved()}; });
+  if (impl_->archive) impl_->archive->add_stored(map);
+  return map;
 }
 
+void Mapper::save(const std::string& path) const { write_map(path, saved_map()); }
+
 void Mapper::load(const std::string& path) {
-  const std::vector<Surfel> surfels = read_map(path);
+  const SavedMap map = read_saved_map(path);
   try {
-    load(surfels);
+    load(map);
   } catch (const DeviceError&) {
     throw;
   } catch (const Error& error) {
@@ -266,15 +268,22 @@ void Mapper::load(const std::string& path) {
   }
 }
 
-void Mapper::load(const std::vector<Surfel>& surfels) {
-  on_device([&] { impl_->begin_map(surfels); });
+void Mapper::load(const std::vector<Surfel>& surfels) { load(SavedMap{surfels, {}}); }
+
+void Mapper::load(const SavedMap& map) {
+  on_device([&] { impl_->begin_map(map); });
 }
 
-void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels) {
-  map.replace(surfels, static_cast<std::uint32_t>(sequence + 1));
+void Mapper::Impl::begin_map(const SavedMap& saved) {
+  SeenSpace filled;
+  const bool has_seen = saved.seen.points > 0 && saved.seen.block_size == map.block_size();
+  if (config.seen_points && !has_seen) filled = fill_seen(saved.surfels, map.block_size(), shift_for(saved.surfels, map.block_size()));
+  if (config.seen_points && has_seen) SeenPoints::check(saved.seen);
+  map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   ++sequence;
   views.clear(map.size() == 0);
   seen.clear();
+  if (config.seen_points) seen.load(has_seen ? saved.seen : filled);
   if (!archive) return;
   archive->clear();
   archive->save_some(static_cast<std::uint32_t>(sequence));
@@ -289,6 +298,7 @@ Statistics Mapper::statistics() const {
   for (const Surfel& surfel : surfels()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
   statistics.surfels = statistics.occupied + statistics.frontier;
   statistics.map_bytes = impl_->map.bytes();
+  statistics.seen_bytes = impl_->seen.bytes();
   statistics.device_bytes = impl_->device_bytes();
   return statistics;
 }

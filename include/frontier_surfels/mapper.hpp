@@ -43,6 +43,9 @@ class Mapper {
   /// reported as removed, and as updated with new ids when they come back.
   Changes changes(std::uint64_t since) const;
 
+  /// The whole map as files keep it, with what has been seen; with a map_folder, also what is on disk. @throws FileError
+  SavedMap saved_map() const;
+
   /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. With
   /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
@@ -55,6 +58,10 @@ class Mapper {
   /// Replaces the map by these surfels, which get new ids. Radii are limited to four blocks (2 m where z_max is at most 12 m), which is far
   /// more than this mapper makes.
   void load(const std::vector<Surfel>& surfels);
+
+  /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in from
+  /// the surfels. @throws FileError  what has been seen is damaged; the map stays as it was
+  void load(const SavedMap& map);
 
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
   void reset();

@@ -104,6 +104,24 @@ struct Changes {
   std::vector<std::uint32_t> removed;  ///< ids that are no longer in the map
 };
 
+/// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size [m],
+/// block (x, y, z) with its lowest corner at (x, y, z) block_size; points are counted along a block's edge.
+struct SeenSpace {
+  struct Block {
+    std::array<std::int32_t, 3> block = {0, 0, 0};  ///< x, y, z
+    std::vector<std::uint8_t> bytes;                ///< see src/map/seen_points.hpp
+  };
+  double block_size = 0;  ///< [m]
+  int points = 0;         ///< of a block along an edge; 0: nothing is known of what has been seen
+  std::vector<Block> blocks;
+};
+
+/// A whole map, as files keep it.
+struct SavedMap {
+  std::vector<Surfel> surfels;
+  SeenSpace seen;
+};
+
 /// Wall or device time of one stage of the pipeline.
 struct StageTime {
   std::string name;
@@ -122,6 +140,7 @@ struct Report {
   std::size_t map_bytes = 0;  ///< memory of the surfels and of their index, with free pages, and with spare capacity on devices that have
                               ///< memory of their own
   std::size_t device_bytes = 0;   ///< all buffers on the device, with the map's; without memory that a CPU's system has not provided yet
+  std::size_t seen_bytes = 0;     ///< memory of what views have seen that are no longer kept
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
   std::vector<StageTime> stages;  ///< device time of each stage, in running order, by OpenCL events
@@ -133,6 +152,7 @@ struct Statistics {
   std::size_t occupied = 0;
   std::size_t frontier = 0;
   std::size_t map_bytes = 0;     ///< see Report
+  std::size_t seen_bytes = 0;    ///< see Report
   std::size_t device_bytes = 0;  ///< see Report
 };
 

@@ -26,6 +26,15 @@ void write_map(const std::string& path, const std::vector<Surfel>& surfels) {
   format_of(path) == Format::kPly ? write_ply(path, surfels) : write_pcd(path, surfels);
 }
 
-std::vector<Surfel> read_map(const std::string& path) { return format_of(path) == Format::kPly ? read_ply(path) : read_pcd(path); }
+void write_map(const std::string& path, const SavedMap& map) {
+  format_of(path) == Format::kPly ? write_ply(path, map.surfels, map.seen) : write_pcd(path, map.surfels);
+}
+
+SavedMap read_saved_map(const std::string& path) {
+  if (format_of(path) == Format::kPly) return read_saved_ply(path);
+  return {read_pcd(path), {}};
+}
+
+std::vector<Surfel> read_map(const std::string& path) { return read_saved_map(path).surfels; }
 
 }  // namespace frontier_surfels

@@ -1,8 +1,10 @@
 #include "frontier_surfels/ply.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cinttypes>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 
 #include "map/surfel_file.hpp"
@@ -20,15 +22,51 @@ static_assert(sizeof(Record) == 32);
 constexpr std::size_t kLongestHeader = 1024;  // [byte]
 constexpr char kHeaderEnd[] = "end_header\n";
 
-std::string header(std::uint32_t crc, std::uint64_t count) {
-  char start[160];
-  std::snprintf(start, sizeof start,
-                "ply\nformat binary_little_endian 1.0\ncomment frontier_surfels 1 crc32 %08" PRIx32 "\nelement vertex %" PRIu64 "\n", crc,
-                count);
-  std::string text = start;
+/// The shortest text that gives the same number, whatever the locale.
+std::string text_of(double value) {
+  char text[40];
+  return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
+}
+
+/// What a header says of the body.
+struct Sizes {
+  std::uint32_t crc = 0;
+  std::uint64_t surfels = 0;
+  double block_size = 0;  ///< of what has been seen [m]
+  int points = 0;         ///< of it, along a block's edge
+  std::uint64_t blocks = 0;
+};
+
+std::string header(const Sizes& sizes) {
+  char line[160];
+  std::snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\ncomment frontier_surfels 1 crc32 %08" PRIx32 "\n", sizes.crc);
+  std::string text = line;
+  if (sizes.points > 0) text += "comment seen_block " + std::to_string(sizes.points) + " points " + text_of(sizes.block_size) + " m\n";
+  text += "element vertex " + std::to_string(sizes.surfels) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"}) text += std::string("property float ") + name + "\n";
   for (const char* name : {"red", "green", "blue", "label"}) text += std::string("property uchar ") + name + "\n";
+  if (sizes.points > 0) {
+    text += "element seen_block " + std::to_string(sizes.blocks) + "\n";
+    for (const char* name : {"x", "y", "z"}) text += std::string("property int ") + name + "\n";
+    text += "property list uint uchar bytes\n";
+  }
   return text + kHeaderEnd;
+}
+
+/// Reads what header() has written: anything else gives other sizes, whose header is another one.
+Sizes sizes_of(const std::string& header) {
+  Sizes sizes;
+  const auto after = [&](const char* words) {
+    const std::size_t at = header.find(words);
+    return at == std::string::npos ? "" : header.c_str() + at + std::strlen(words);
+  };
+  sizes.crc = static_cast<std::uint32_t>(std::strtoul(after("crc32 "), nullptr, 16));
+  sizes.surfels = std::strtoull(after("element vertex "), nullptr, 10);
+  sizes.points = static_cast<int>(std::strtoul(after("comment seen_block "), nullptr, 10));
+  sizes.blocks = std::strtoull(after("element seen_block "), nullptr, 10);
+  const char* size = after(" points ");
+  std::from_chars(size, size + std::strlen(size), sizes.block_size);
+  return sizes;
 }
 
 Record to_record(const Surfel& s) {
@@ -51,6 +89,25 @@ Surfel to_surfel(const std::uint8_t* bytes, std::uint32_t id) {
   return {{r.x, r.y, r.z}, {r.nx, r.ny, r.nz}, r.radius, static_cast<Label>(r.label), {r.red, r.green, r.blue}, id};
 }
 
+FileError cut_off(const std::string& path, const Sizes& sizes) {
+  return FileError(path + " is cut off or too long: its header promises " + std::to_string(sizes.surfels) +
+                   " surfels, which its size does not fit.");
+}
+
+/// A block of what has been seen. @param at  where it begins, and then where it ends
+SeenSpace::Block read_block(const std::vector<std::uint8_t>& body, std::size_t* at, const std::string& path, const Sizes& sizes) {
+  SeenSpace::Block block;
+  std::uint32_t size = 0;
+  const std::size_t head = sizeof block.block + sizeof size;
+  if (body.size() - *at < head) throw cut_off(path, sizes);
+  std::memcpy(block.block.data(), &body[*at], sizeof block.block);
+  std::memcpy(&size, &body[*at + sizeof block.block], sizeof size);
+  if (body.size() - *at - head < size) throw cut_off(path, sizes);
+  block.bytes.assign(body.begin() + static_cast<std::ptrdiff_t>(*at + head), body.begin() + static_cast<std::ptrdiff_t>(*at + head + size));
+  *at += head + size;
+  return block;
+}
+
 /// The header of a file, up to and with its last line.
 std::string read_header(SurfelFile& file, const std::string& path) {
   const std::string text = file.start(kLongestHeader);
@@ -61,38 +118,51 @@ std::string read_header(SurfelFile& file, const std::string& path) {
 
 }  // namespace
 
-void write_ply(const std::string& path, const std::vector<Surfel>& surfels) {
+void write_ply(const std::string& path, const std::vector<Surfel>& surfels, const SeenSpace& seen) {
   check_written(path, surfels);
-  std::vector<Record> records(surfels.size());
-  std::transform(surfels.begin(), surfels.end(), records.begin(), to_record);
-  const std::size_t bytes = records.size() * sizeof(Record);
-  replace_file(path, header(checksum(records.data(), bytes), records.size()), records.data(), bytes);
+  std::vector<std::uint8_t> body(surfels.size() * sizeof(Record));
+  for (std::size_t n = 0; n < surfels.size(); ++n) {
+    const Record record = to_record(surfels[n]);
+    std::memcpy(&body[n * sizeof record], &record, sizeof record);
+  }
+  const auto append = [&body](const void* data, std::size_t bytes) {
+    body.insert(body.end(), static_cast<const std::uint8_t*>(data), static_cast<const std::uint8_t*>(data) + bytes);
+  };
+  for (const SeenSpace::Block& block : seen.blocks) {
+    const auto size = static_cast<std::uint32_t>(block.bytes.size());
+    append(block.block.data(), sizeof block.block);
+    append(&size, sizeof size);
+    append(block.bytes.data(), size);
+  }
+  replace_file(path, header({checksum(body.data(), body.size()), surfels.size(), seen.block_size, seen.points, seen.blocks.size()}),
+               body.data(), body.size());
 }
 
-std::vector<Surfel> read_ply(const std::string& path) {
+std::vector<Surfel> read_ply(const std::string& path) { return read_saved_ply(path).surfels; }
+
+SavedMap read_saved_ply(const std::string& path) {
   SurfelFile file(path);
   const std::string text = read_header(file, path);
-  std::uint32_t crc = 0;
-  std::uint64_t count = 0;
-  std::sscanf(text.c_str(), "ply format binary_little_endian 1.0 comment frontier_surfels 1 crc32 %8" SCNx32 " element vertex %" SCNu64,
-              &crc, &count);
-  if (text != header(crc, count)) {  // whatever sscanf made of it
+  const Sizes sizes = sizes_of(text);
+  if (text != header(sizes))
     throw FileError(path + " is a PLY file of another layout than a saved map: give a file that was saved by this library.");
-  }
-
-  const std::uint64_t size = file.body_bytes(text.size());
-  if (size % sizeof(Record) != 0 || size / sizeof(Record) != count) {
-    throw FileError(path + " is cut off or too long: its header promises " + std::to_string(count) +
-                    " surfels, which its size does not fit.");
-  }
+  const std::uint64_t size = file.body_bytes(text.size()), of_surfels = sizes.surfels * sizeof(Record);
+  const bool fits = size / sizeof(Record) >= sizes.surfels && (sizes.points > 0 || size == of_surfels);
+  if (!fits) throw cut_off(path, sizes);
   const std::vector<std::uint8_t> body = file.body(text.size());
-  if (checksum(body.data(), body.size()) != crc)
-    throw FileError(path + " is damaged: its checksum does not fit its surfels; use another copy.");
+  if (checksum(body.data(), body.size()) != sizes.crc)
+    throw FileError(path + " is damaged: its checksum does not fit its contents; use another copy.");
 
-  std::vector<Surfel> surfels(count);
-  for (std::size_t n = 0; n < surfels.size(); ++n) surfels[n] = to_surfel(&body[n * sizeof(Record)], static_cast<std::uint32_t>(n));
-  check_read(path, surfels);
-  return surfels;
+  SavedMap map;
+  map.surfels.resize(sizes.surfels);
+  for (std::size_t n = 0; n < map.surfels.size(); ++n)
+    map.surfels[n] = to_surfel(&body[n * sizeof(Record)], static_cast<std::uint32_t>(n));
+  check_read(path, map.surfels);
+  map.seen = {sizes.block_size, sizes.points, {}};
+  std::size_t at = of_surfels;
+  for (std::uint64_t n = 0; n < sizes.blocks; ++n) map.seen.blocks.push_back(read_block(body, &at, path, sizes));
+  if (at != body.size()) throw cut_off(path, sizes);
+  return map;
 }
 
 }  // namespace frontier_surfels

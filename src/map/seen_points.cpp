@@ -2,17 +2,80 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr int kMostShift = 6;  // 64 bricks, hence 1024 points, along a block's edge
 constexpr std::size_t kGroup = 64;
+constexpr std::size_t kBrickBytes = SEEN_WORDS * sizeof(cl_ulong);
 
 }  // namespace
 
+void SeenBlockBytes::add_points(const std::function<bool(int)>& is_seen) {
+  states_.push_back(SEEN_MIXED);
+  std::vector<std::uint8_t> words(kBrickBytes, 0);
+  for (int point = 0; point < SEEN_BRICK * SEEN_BRICK * SEEN_BRICK; ++point) {
+    if (!is_seen(point)) continue;
+    const int x = point % SEEN_BRICK, y = point / SEEN_BRICK % SEEN_BRICK, z = point / SEEN_BRICK / SEEN_BRICK;
+    const int word = (z / 4 * 4 + y / 4) * 4 + x / 4, bit = (z % 4 * 4 + y % 4) * 4 + x % 4;
+    words[8 * word + bit / 8] |= static_cast<std::uint8_t>(1 << bit % 8);
+  }
+  words_.insert(words_.end(), words.begin(), words.end());
+}
+
+std::vector<std::uint8_t> SeenBlockBytes::take() {
+  states_.insert(states_.end(), words_.begin(), words_.end());
+  return std::move(states_);
+}
+
+namespace {
+
+void check_block(const std::vector<std::uint8_t>& bytes, std::size_t bricks) {
+  if (bytes.empty()) return;
+  const auto states_end = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bricks, bytes.size()));
+  const auto mixed = static_cast<std::size_t>(std::count(bytes.begin(), states_end, SEEN_MIXED));
+  const bool known = std::all_of(bytes.begin(), states_end, [](std::uint8_t state) { return state <= SEEN_ALL; });
+  if (!known || bytes.size() != bricks + mixed * kBrickBytes)
+    throw FileError("What has been seen in a block is damaged, or was saved with another distance of its points: use another copy.");
+}
+
+}  // namespace
+
+void SeenPoints::check(const SeenSpace& seen) {
+  int shift = 0;
+  while (shift < kMostShift && SEEN_BRICK << shift < seen.points) ++shift;
+  if (seen.points != SEEN_BRICK << shift)
+    throw FileError("What has been seen has " + std::to_string(seen.points) +
+                    " points along a block's edge, which is no power of two from 16 to 1024: use another copy of the map.");
+  for (const SeenSpace::Block& block : seen.blocks) check_block(block.bytes, std::size_t{1} << (3 * shift));
+}
+
+void SeenPoints::load(const SeenSpace& seen) {
+  check(seen);
+  choose_shift(static_cast<int>(std::lround(std::log2(seen.points / SEEN_BRICK))));
+  std::vector<SeenBlock> blocks;
+  for (const SeenSpace::Block& block : seen.blocks) blocks.push_back({{block.block[0], block.block[1], block.block[2]}, block.bytes});
+  add_blocks(blocks);
+}
+
+SeenSpace SeenPoints::saved() const {
+  SeenSpace seen;
+  seen.block_size = block_size_;
+  seen.points = SEEN_BRICK << shift_;
+  const std::vector<BlockKey> blocks = blocks_with_points();
+  std::vector<std::vector<std::uint8_t>> bytes = read_blocks(blocks);
+  for (std::size_t n = 0; n < blocks.size(); ++n) seen.blocks.push_back({{blocks[n].x, blocks[n].y, blocks[n].z}, std::move(bytes[n])});
+  return seen;
+}
+
 SeenPoints::SeenPoints(Commands& commands, double block_size)
-    : commands_(commands), block_size_(block_size), slots_(commands), entries_(commands), tables_on_device_(commands), bricks_(commands) {
+    : commands_(commands), block_size_(block_size), slots_(commands), entries_(commands), tables_on_device_(commands), bricks_(commands),
+      gathered_(commands), gathered_list_(commands) {
   clear();
 }
 
@@ -20,9 +83,10 @@ void SeenPoints::clear() {
   table_of_.clear();
   tables_.assign(bricks_of_block(), SEEN_BRICK_EMPTY);
   full_bricks_.assign(1, 0);
+  free_tables_.clear();
   free_.clear();
   used_ = 2;
-  changed_entries_.clear();
+  changed_places_.clear();
   tables_on_device_.write(tables_);
   sent_tables_ = tables_.size();
   std::vector<cl_ulong> uniform(2 * SEEN_WORDS, 0);
@@ -32,10 +96,16 @@ void SeenPoints::clear() {
 }
 
 void SeenPoints::choose_spacing(double spacing) {
-  if (!empty()) return;
-  const double bricks = block_size_ / (SEEN_BRICK * spacing);
-  const int shift = std::clamp(static_cast<int>(std::ceil(std::log2(bricks) - 1e-9)), 0, kMostShift);
-  if (shift == shift_) return;
+  choose_shift(shift_for_spacing(block_size_, spacing));
+}
+
+int SeenPoints::shift_for_spacing(double block_size, double spacing) {
+  const double bricks = block_size / (SEEN_BRICK * spacing);
+  return std::clamp(static_cast<int>(std::ceil(std::log2(bricks) - 1e-9)), 0, kMostShift);
+}
+
+void SeenPoints::choose_shift(int shift) {
+  if (!empty() || shift == shift_) return;
   shift_ = shift;
   clear();
 }
@@ -52,18 +122,24 @@ void SeenPoints::open_window(const MapWindow& window) {
 }
 
 int SeenPoints::table(const BlockKey& block) {
-  const auto [found, is_new] = table_of_.emplace(block, static_cast<int>(full_bricks_.size()));
-  if (is_new) {
+  const auto found = table_of_.find(block);
+  if (found != table_of_.end()) return found->second;
+  int number = static_cast<int>(full_bricks_.size());
+  if (free_tables_.empty()) {
     full_bricks_.push_back(0);
     tables_.resize(tables_.size() + bricks_of_block(), SEEN_BRICK_EMPTY);
+  } else {
+    number = free_tables_.back();
+    free_tables_.pop_back();
   }
-  return found->second;
+  table_of_.emplace(block, number);
+  return number;
 }
 
 void SeenPoints::set_entry(int table, int brick, cl_int value) {
   const std::size_t place = at(table, brick);
   tables_[place] = value;
-  changed_entries_.push_back({{static_cast<cl_int>(place), value}});
+  changed_places_.push_back(static_cast<cl_int>(place));
 }
 
 cl_int SeenPoints::add_brick(int table, int brick) {
@@ -92,13 +168,99 @@ void SeenPoints::send_entries(const char* stage) {
     tables_on_device_.write(std::vector<cl_int>(tables_.begin() + sent_tables_, tables_.end()), sent_tables_);
     sent_tables_ = tables_.size();
   }
-  if (changed_entries_.empty()) return;
+  if (changed_places_.empty()) return;
   bricks_.grow(SEEN_WORDS * used_, bricks_.size());
-  const auto count = static_cast<cl_int>(changed_entries_.size());
-  entries_.send(std::move(changed_entries_));
-  changed_entries_.clear();
+  std::sort(changed_places_.begin(), changed_places_.end());
+  changed_places_.erase(std::unique(changed_places_.begin(), changed_places_.end()), changed_places_.end());
+  std::vector<cl_int2> entries;
+  for (const cl_int place : changed_places_) entries.push_back({{place, tables_[place]}});
+  const auto count = static_cast<cl_int>(entries.size());
+  entries_.send(std::move(entries));
+  changed_places_.clear();
   commands_.run(stage, "set_seen_bricks", SEEN_WORDS * static_cast<std::size_t>(count), kGroup, entries_(), count, tables_on_device_(),
                 bricks_());
+}
+
+std::vector<BlockKey> SeenPoints::blocks_with_points() const {
+  std::vector<BlockKey> blocks;
+  for (const auto& [block, table] : table_of_) {
+    const auto begin = tables_.begin() + at(table, 0);
+    if (std::any_of(begin, begin + bricks_of_block(), [](cl_int entry) { return entry != SEEN_BRICK_EMPTY; })) blocks.push_back(block);
+  }
+  std::sort(blocks.begin(), blocks.end());
+  return blocks;
+}
+
+std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector<BlockKey>& blocks) const {
+  const int bricks = bricks_of_block();
+  std::vector<std::vector<std::uint8_t>> stored(blocks.size());
+  std::vector<cl_int> mixed;
+  for (std::size_t n = 0; n < blocks.size(); ++n) {
+    const auto found = table_of_.find(blocks[n]);
+    if (found == table_of_.end()) continue;
+    bool any = false;
+    for (int brick = 0; brick < bricks; ++brick) {
+      const cl_int number = entry(found->second, brick);
+      any = any || number != SEEN_BRICK_EMPTY;
+      stored[n].push_back(number == SEEN_BRICK_EMPTY ? SEEN_NONE : number == SEEN_BRICK_FULL ? SEEN_ALL : SEEN_MIXED);
+      if (number > SEEN_BRICK_FULL) mixed.push_back(number);
+    }
+    if (!any) stored[n].clear();
+  }
+  if (mixed.empty()) return stored;
+  const std::size_t words = SEEN_WORDS * mixed.size();
+  const auto count = static_cast<cl_int>(mixed.size());
+  gathered_.resize(words);
+  gathered_list_.send(std::move(mixed));
+  commands_.run("changes", "gather_bricks", words, kGroup, gathered_list_(), count, bricks_(), gathered_());
+  const std::vector<cl_ulong> gathered = gathered_.read(words);
+  const auto* next = reinterpret_cast<const std::uint8_t*>(gathered.data());
+  for (std::vector<std::uint8_t>& bytes : stored) {
+    const std::size_t own = kBrickBytes * static_cast<std::size_t>(std::count(bytes.begin(), bytes.end(), SEEN_MIXED));
+    bytes.insert(bytes.end(), next, next + own);
+    next += own;
+  }
+  return stored;
+}
+
+void SeenPoints::add_blocks(const std::vector<SeenBlock>& blocks) {
+  const auto bricks = static_cast<std::size_t>(bricks_of_block());
+  for (const auto& [block, bytes] : blocks) check_block(bytes, bricks);
+  std::vector<cl_int> numbers;
+  std::vector<cl_ulong> words;
+  for (const auto& [block, bytes] : blocks) {
+    drop_block(block);
+    if (bytes.empty()) continue;
+    const int own = table(block);
+    for (std::size_t brick = 0; brick < bricks; ++brick) {
+      if (bytes[brick] == SEEN_ALL) set_full(own, static_cast<int>(brick));
+      if (bytes[brick] == SEEN_MIXED) numbers.push_back(add_brick(own, static_cast<int>(brick)));
+    }
+    const std::size_t before = words.size();
+    words.resize(before + (bytes.size() - bricks) / sizeof(cl_ulong));
+    if (words.size() > before) std::memcpy(&words[before], &bytes[bricks], bytes.size() - bricks);
+  }
+  send_entries("changes");
+  if (numbers.empty()) return;
+  const auto count = static_cast<cl_int>(numbers.size());
+  gathered_.write(words);
+  gathered_list_.send(std::move(numbers));
+  commands_.run("changes", "scatter_bricks", words.size(), kGroup, gathered_list_(), count, gathered_(), bricks_());
+}
+
+/// The change of the tables waits for the next send_entries(): until then no table sent by open_window() has the block.
+void SeenPoints::drop_block(const BlockKey& block) {
+  const auto found = table_of_.find(block);
+  if (found == table_of_.end()) return;
+  for (int brick = 0; brick < bricks_of_block(); ++brick) {
+    const cl_int number = entry(found->second, brick);
+    if (number == SEEN_BRICK_EMPTY) continue;
+    if (number > SEEN_BRICK_FULL) free_.push_back(number);
+    set_entry(found->second, brick, SEEN_BRICK_EMPTY);
+  }
+  full_bricks_[found->second] = 0;
+  free_tables_.push_back(found->second);
+  table_of_.erase(found);
 }
 
 std::size_t SeenPoints::bytes() const {

@@ -3,15 +3,36 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <unordered_map>
 #include <vector>
 
 #include "common/shared.h"
+#include "frontier_surfels/types.hpp"
 #include "map/block_key.hpp"
 #include "map/map_window.hpp"
 #include "opencl/commands.hpp"
 
 namespace frontier_surfels {
+
+/// Distance of the points, unless a parameter says otherwise [edge of the smallest voxels].
+constexpr double kSeenSpacing = 2.5;
+
+/// Makes the bytes of a block brick by brick, in the order of its table.
+class SeenBlockBytes {
+ public:
+  void add_uniform(std::uint8_t state) { states_.push_back(state); }
+
+  /// @param is_seen  of a point, numbered (z SEEN_BRICK + y) SEEN_BRICK + x
+  void add_points(const std::function<bool(int)>& is_seen);
+  std::vector<std::uint8_t> take();
+
+ private:
+  std::vector<std::uint8_t> states_, words_;
+};
+
+/// What is remembered of a block, as SeenPoints::read_blocks() gives it.
+using SeenBlock = StoredBlock;
 
 class SeenPoints {
  public:
@@ -21,6 +42,8 @@ class SeenPoints {
   /// Chooses the lattice, if nothing is remembered yet: the distance of its points becomes a block's edge divided by a power of two, and at
   /// most `spacing` [m], unless that would be below 1 / 1024 of the edge.
   void choose_spacing(double spacing);
+  void choose_shift(int shift);         ///< as choose_spacing(), by the logarithm of the number of bricks along a block's edge
+  static int shift_for_spacing(double block_size, double spacing);
   double spacing() const;         ///< distance of the lattice's points [m]
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
   bool empty() const { return table_of_.empty(); }
@@ -39,6 +62,23 @@ class SeenPoints {
   cl_int add_brick(int table, int brick);      ///< a brick of its own, without seen points, for a place that has none. @return its number
   void set_full(int table, int brick);  ///< all points of the brick are seen; its own brick, if it has one, becomes free
   void send_entries(const char* stage);
+  /// @}
+
+  /// @name Whole blocks, for files and for the archive. Their bytes: a state for each brick (SEEN_NONE, SEEN_MIXED, SEEN_ALL), then the words
+  /// of the bricks with SEEN_MIXED.
+  /// @{
+  std::vector<BlockKey> blocks_with_points() const;  ///< sorted
+  std::vector<std::vector<std::uint8_t>> read_blocks(const std::vector<BlockKey>& blocks) const;  ///< no bytes: no point is seen
+
+  /// Puts blocks with these bytes in place of what is remembered of them. @throws FileError  the bytes are those of another lattice, or damaged
+  void add_blocks(const std::vector<SeenBlock>& blocks);
+  void drop_block(const BlockKey& block);
+
+  SeenSpace saved() const;  ///< all blocks
+
+  /// @throws FileError  add_blocks() would refuse a block of it, or the lattice
+  static void check(const SeenSpace& seen);
+  void load(const SeenSpace& seen);  ///< into an empty memory
   /// @}
 
   void clear();
@@ -61,14 +101,17 @@ class SeenPoints {
   std::unordered_map<BlockKey, int> table_of_;
   std::vector<cl_int> tables_;           ///< the device's tables; the host is their master
   std::vector<int> full_bricks_;         ///< of each table: number of entries that are SEEN_BRICK_FULL
+  std::vector<int> free_tables_;         ///< of blocks that were dropped; the last one is used next
   std::vector<cl_int> free_;             ///< bricks that no entry has; the last one is used next
   std::size_t used_ = 2;                 ///< one past the last brick ever used; the first two stand for uniform bricks
   std::size_t sent_tables_ = 0;          ///< entries that the device has
-  std::vector<cl_int2> changed_entries_;  ///< place in the tables and new value
+  std::vector<cl_int> changed_places_;   ///< entries of the tables that the device does not have yet
   SentArray<cl_int> slots_;
   SentArray<cl_int2> entries_;
   DeviceArray<cl_int> tables_on_device_;
   DeviceArray<cl_ulong> bricks_;
+  mutable DeviceArray<cl_ulong> gathered_;
+  mutable SentArray<cl_int> gathered_list_;
 };
 
 }  // namespace frontier_surfels

@@ -1,8 +1,6 @@
 #include "stages/remembering.hpp"
 
 #include <utility>
-#include <algorithm>
-#include <cstdio>
 
 #include "map/view_blocks.hpp"
 #include "stages/frame.hpp"
@@ -11,7 +9,7 @@ namespace frontier_surfels {
 
 Remembering::Remembering(Commands& commands) : commands_(commands), blocks_(commands), seen_by_(commands), found_(commands), full_(commands) {}
 
-void Remembering::remember(const ForgottenView& forgotten, const RecentViews& views, double block_size, SeenPoints& seen) {
+std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, const RecentViews& views, double block_size, SeenPoints& seen) {
   const char* stage = "remembering";
   const ViewBlocks around = blocks_of_view(forgotten.intrinsics, forgotten.T_world_camera, forgotten.deepest, block_size);
   std::vector<cl_int4> blocks;
@@ -20,7 +18,7 @@ void Remembering::remember(const ForgottenView& forgotten, const RecentViews& vi
     if (seen.is_full(table)) continue;
     blocks.push_back({{key.x - around.window.origin_x, key.y - around.window.origin_y, key.z - around.window.origin_z, table}});
   }
-  if (blocks.empty()) return;
+  if (blocks.empty()) return {};
   seen.send_entries(stage);
 
   // What the view adds to each brick
@@ -29,16 +27,19 @@ void Remembering::remember(const ForgottenView& forgotten, const RecentViews& vi
   const std::size_t count = blocks.size();
   found_.resize(count * bricks);
   blocks_.send(blocks);
-  commands_.run("find_bricks", "find_seen_bricks", count * bricks, kGroup, around.window, view, static_cast<cl_int>(seen.shift()), views.depths(),
+  commands_.run(stage, "find_seen_bricks", count * bricks, kGroup, around.window, view, static_cast<cl_int>(seen.shift()), views.depths(),
                 blocks_(), static_cast<cl_int>(count), seen.tables(), found_());
   const std::vector<cl_uchar> found = found_.read(count * bricks);
 
   // Bricks whose points must be asked for, each with its place in the tables
   std::vector<cl_int4> asked;
   std::vector<std::pair<int, int>> places;
+  std::vector<BlockKey> changed;
   for (std::size_t n = 0; n < found.size(); ++n) {
     if (found[n] == SEEN_NONE) continue;
     const cl_int4& block = blocks[n / bricks];
+    const BlockKey key = {around.window.origin_x + block.s[0], around.window.origin_y + block.s[1], around.window.origin_z + block.s[2]};
+    if (changed.empty() || changed.back() != key) changed.push_back(key);
     const int table = block.s[3], brick = static_cast<int>(n % bricks);
     if (found[n] == SEEN_ALL) {
       seen.set_full(table, brick);
@@ -51,17 +52,17 @@ void Remembering::remember(const ForgottenView& forgotten, const RecentViews& vi
     places.emplace_back(table, brick);
   }
   seen.send_entries(stage);
-  { static int n = 0; if (++n % 50 == 0) fprintf(stderr, "blocks %zu bricks asked %zu all %zu; bricks %zu tables %zu bytes %zu\n", count, asked.size(), (size_t)std::count(found.begin(), found.end(), 2), seen.bricks(), seen.blocks(), seen.bytes()); }
-  if (asked.empty()) return;
+  if (asked.empty()) return changed;
   const auto asked_count = static_cast<cl_int>(asked.size());
   seen_by_.send(std::move(asked));
-  commands_.run("see_points", "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8), commands_.device().heavy_group(), around.window, view,
+  commands_.run(stage, "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8), commands_.device().heavy_group(), around.window, view,
                 static_cast<cl_int>(seen.shift()), views.depths(), seen_by_(), asked_count, seen.brick_words());
   full_.resize(asked_count);
   commands_.run(stage, "find_full_bricks", asked_count, kGroup, seen_by_(), asked_count, seen.brick_words(), full_());
   const std::vector<cl_uchar> full = full_.read(asked_count);
   for (std::size_t n = 0; n < full.size(); ++n)
     if (full[n]) seen.set_full(places[n].first, places[n].second);
+  return changed;
 }
 
 }  // namespace frontier_surfels

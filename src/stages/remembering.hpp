@@ -11,8 +11,8 @@ class Remembering {
  public:
   explicit Remembering(Commands& commands);
 
-  /// Sets the points that a view has seen.
-  void remember(const ForgottenView& view, const RecentViews& views, double block_size, SeenPoints& seen);
+  /// Sets the points that a view has seen. @return the blocks whose memory may have changed
+  std::vector<BlockKey> remember(const ForgottenView& view, const RecentViews& views, double block_size, SeenPoints& seen);
 
  private:
   Commands& commands_;

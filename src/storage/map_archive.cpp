@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <utility>
 
@@ -19,6 +20,28 @@ BlockKey region_of(const BlockKey& block) {
   return {floor_divide(block.x, kRegion), floor_divide(block.y, kRegion), floor_divide(block.z, kRegion)};
 }
 
+/// What the folder keeps of a block: the number of bytes of its surfels, these, and then what has been seen. Nothing if both are empty.
+struct StoredParts {
+  std::vector<std::uint8_t> surfels, seen;
+};
+
+void join(std::vector<std::uint8_t>& surfels, const std::vector<std::uint8_t>& seen) {
+  if (surfels.empty() && seen.empty()) return;
+  const auto size = static_cast<std::uint32_t>(surfels.size());
+  const auto* begin = reinterpret_cast<const std::uint8_t*>(&size);
+  surfels.insert(surfels.begin(), begin, begin + sizeof size);
+  surfels.insert(surfels.end(), seen.begin(), seen.end());
+}
+
+StoredParts parts_of(const std::vector<std::uint8_t>& bytes) {
+  std::uint32_t size = 0;
+  if (bytes.size() >= sizeof size) std::memcpy(&size, bytes.data(), sizeof size);
+  if (bytes.size() < sizeof size + size)
+    throw FileError("A block in the map folder is incomplete: the folder is damaged; use a backup or another folder.");
+  const auto seen = bytes.begin() + static_cast<std::ptrdiff_t>(sizeof size + size);
+  return {{bytes.begin() + sizeof size, seen}, {seen, bytes.end()}};
+}
+
 /// Largest distance along an axis between a point and a cube's centre [m].
 double distance(const Eigen::Vector3d& point, const BlockKey& cube, double size) {
   return (point - (Eigen::Vector3d(cube.x, cube.y, cube.z).array() + 0.5).matrix() * size).cwiseAbs().maxCoeff();
@@ -26,15 +49,15 @@ double distance(const Eigen::Vector3d& point, const BlockKey& cube, double size)
 
 }  // namespace
 
-MapArchive::MapArchive(const Config& config, SurfelMap& map)
-    : map_(map), radius_(config.eviction_radius), folder_(config.map_folder, map.block_size()) {
+MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen)
+    : map_(map), seen_(seen), radius_(config.eviction_radius), folder_(config.map_folder, map.block_size()) {
   for (const BlockKey& block : folder_.keys()) note_stored(block);
 }
 
 MapArchive::~MapArchive() {
   try {
     folder_.flush();
-    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
+    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(read(blocks));
     folder_.flush();
   } catch (const std::exception&) {  // what was saved before is still there
   }
@@ -76,28 +99,32 @@ MapArchive::Blocks MapArchive::stored_near(const Eigen::Vector3d& camera, double
 
 bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   const Blocks near = stored_near(camera, radius);
+  std::vector<SeenBlock> seen;
   for (const BlockKey& block : near) {
-    map_.add_block(block, folder_.read(block), frame);
+    const StoredParts parts = parts_of(folder_.read(block));
+    map_.add_block(block, parts.surfels, frame);
+    seen.push_back({block, parts.seen});
     const auto region = stored_.find(region_of(block));
     region->second.erase(std::find(region->second.begin(), region->second.end(), block));
     if (region->second.empty()) stored_.erase(region);
   }
+  seen_.add_blocks(seen);
   return !near.empty();
 }
 
 /// Those a little further than `radius` stay where they are, so that none goes to and fro; and those that cannot be written.
 bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   Blocks far;
-  for (const auto& [block, pages] : map_.index().blocks())
+  for (const BlockKey& block : in_memory())
     if (distance(camera, block, map_.block_size()) > radius + 2 * map_.block_size()) far.push_back(block);
   if (far.empty()) return false;
-  std::sort(far.begin(), far.end());
   const Blocks changed = unsaved();
   const auto is_unsaved = [&](const BlockKey& block) { return std::binary_search(changed.begin(), changed.end(), block); };
   if (std::any_of(far.begin(), far.end(), is_unsaved) && !save(changed, frame - 1, frame))
     far.erase(std::remove_if(far.begin(), far.end(), is_unsaved), far.end());
   for (const BlockKey& block : far) {
     map_.drop_block(block, frame);
+    seen_.drop_block(block);
     note_stored(block);
   }
   return !far.empty();
@@ -111,7 +138,7 @@ void MapArchive::save_some(std::uint32_t frame) {
 MapArchive::Blocks MapArchive::unsaved() const {
   const Blocks changed = map_.blocks_changed_since(saved_);
   Blocks all;
-  std::set_union(changed.begin(), changed.end(), shrunk_.begin(), shrunk_.end(), std::back_inserter(all));
+  std::set_union(changed.begin(), changed.end(), noted_.begin(), noted_.end(), std::back_inserter(all));
   return all;
 }
 
@@ -120,34 +147,53 @@ MapArchive::Blocks MapArchive::unsaved() const {
 bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame) {
   if (frame < next_try_) return false;
   try {
-    if (!blocks.empty()) folder_.write(map_.read_blocks(blocks));
+    if (!blocks.empty()) folder_.write(read(blocks));
   } catch (const std::exception&) {
     fault_ = std::current_exception();
     next_try_ = frame + kSavePeriod;
     return false;
   }
-  shrunk_.clear();
+  noted_.clear();
   saved_ = mapped;
   return true;
 }
 
-std::vector<Surfel> MapArchive::stored() const {
+/// Blocks with surfels, or in which something has been seen; sorted.
+MapArchive::Blocks MapArchive::in_memory() const {
+  Blocks with_surfels;
+  for (const auto& [block, pages] : map_.index().blocks()) with_surfels.push_back(block);
+  std::sort(with_surfels.begin(), with_surfels.end());
+  const Blocks seen = seen_.blocks_with_points();
+  Blocks all;
+  std::set_union(with_surfels.begin(), with_surfels.end(), seen.begin(), seen.end(), std::back_inserter(all));
+  return all;
+}
+
+/// The blocks as the folder keeps them.
+std::vector<StoredBlock> MapArchive::read(const Blocks& blocks) const {
+  std::vector<StoredBlock> stored = map_.read_blocks(blocks);
+  const std::vector<std::vector<std::uint8_t>> seen = seen_.read_blocks(blocks);
+  for (std::size_t n = 0; n < stored.size(); ++n) join(stored[n].second, seen[n]);
+  return stored;
+}
+
+void MapArchive::add_stored(SavedMap& map) const {
   Blocks blocks;
   for (const auto& [region, some] : stored_) blocks.insert(blocks.end(), some.begin(), some.end());
   std::sort(blocks.begin(), blocks.end());
-  std::vector<Surfel> surfels;
   for (const BlockKey& block : blocks) {
-    const std::vector<Surfel> some = unpack_block(folder_.read(block), block, map_.block_size());
-    surfels.insert(surfels.end(), some.begin(), some.end());
+    const StoredParts parts = parts_of(folder_.read(block));
+    const std::vector<Surfel> some = unpack_block(parts.surfels, block, map_.block_size());
+    map.surfels.insert(map.surfels.end(), some.begin(), some.end());
+    if (!parts.seen.empty()) map.seen.blocks.push_back({{block.x, block.y, block.z}, parts.seen});
   }
-  return surfels;
 }
 
 void MapArchive::clear() {
   folder_.clear();
   stored_.clear();
   followed_.reset();
-  shrunk_.clear();
+  noted_.clear();
   fault_ = nullptr;
   saved_ = next_try_ = 0;
 }

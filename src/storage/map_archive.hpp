@@ -10,17 +10,18 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "storage/map_folder.hpp"
 
 namespace frontier_surfels {
 
 /// Blocks come and go whole, once the camera has moved by half a block. All that has changed since the last time is written in one
-/// transaction every so many frames, and before a block of it leaves memory: the folder always holds the map as it was after some frame.
+/// transaction, its surfels together with what has been seen there, every so many frames, and before a block of it leaves memory: the folder always holds the map as it was after some frame.
 class MapArchive {
  public:
   /// @throws FileError  config.map_folder cannot be used
-  MapArchive(const Config& config, SurfelMap& map);
+  MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen);
   ~MapArchive();  ///< writes what is in memory
 
   /// Are there blocks of an earlier map?
@@ -32,14 +33,14 @@ class MapArchive {
   /// gone. What cannot be written stays in memory.
   bool follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame);
 
-  /// Notes blocks that have lost surfels, which no page that is left may tell.
-  void note_shrunk(const std::vector<BlockKey>& blocks) { shrunk_.insert(blocks.begin(), blocks.end()); }
+  /// Notes blocks that have lost surfels, which no page that is left may tell, or in which more has been seen.
+  void note_changed(const std::vector<BlockKey>& blocks) { noted_.insert(blocks.begin(), blocks.end()); }
 
   /// Writes the blocks that have changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
 
-  /// The surfels on disk only. @throws FileError
-  std::vector<Surfel> stored() const;
+  /// Adds what is on disk only. @throws FileError
+  void add_stored(SavedMap& map) const;
 
   /// Forgets everything on disk.
   void clear();
@@ -51,15 +52,18 @@ class MapArchive {
   bool fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   bool evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   Blocks unsaved() const;
+  Blocks in_memory() const;
+  std::vector<StoredBlock> read(const Blocks& blocks) const;
   bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
 
   SurfelMap& map_;
+  SeenPoints& seen_;
   const double radius_;  ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
   std::optional<Eigen::Vector3d> followed_;      ///< where the camera was when blocks last came and went
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
-  std::set<BlockKey> shrunk_;                    ///< since the last save
+  std::set<BlockKey> noted_;                    ///< since the last save
   std::exception_ptr fault_;                     ///< of a save that failed
   std::uint32_t saved_ = 0;                      ///< frame of the last save
   std::uint32_t next_try_ = 0;                   ///< frame that may save again

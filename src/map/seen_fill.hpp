@@ -1,0 +1,19 @@
+/// What has been seen, from the surfels of a map alone: for maps that were saved without it.
+#pragma once
+
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels {
+
+/// Points near surfels are seen if they lie before them: by the sign of a sum over the surfels around, each weighted by its distance. All other
+/// points get the label of the nearest of these, by a search that spreads from seen and unseen points at the same speed: a hole in the cloud
+/// lets little through.
+/// @param shift  logarithm of the number of bricks along a block's edge (SeenPoints)
+SeenSpace fill_seen(const std::vector<Surfel>& surfels, double block_size, int shift);
+
+/// A shift for fill_seen(): its points are as far apart as those of a mapper that makes surfels of these sizes.
+int shift_for(const std::vector<Surfel>& surfels, double block_size);
+
+}  // namespace frontier_surfels
