@@ -69,8 +69,9 @@ struct Mapper::Impl {
         creation(commands, lists),
         remembering(commands) {
     if (config.map_folder.empty()) return;
-    archive = std::make_unique<MapArchive>(config, map, seen);
+    archive = std::make_unique<MapArchive>(config, map, seen, views);
     views.clear(archive->empty());
+    load_views(archive->stored_views());
   }
 
   Report integrate(const DepthFrame& input);
@@ -80,6 +81,7 @@ struct Mapper::Impl {
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(Report& report);
   void begin_map(const SavedMap& saved);
+  void load_views(const std::vector<SavedView>& saved);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
 
   const Config config;
@@ -250,7 +252,11 @@ Changes Mapper::changes(std::uint64_t since) const {
 }
 
 SavedMap Mapper::saved_map() const {
-  SavedMap map = on_device([&] { return SavedMap{impl_->map.download(), impl_->seen.saved()}; });
+  SavedMap map = on_device([&] {
+    SavedMap map = {impl_->map.download(), impl_->seen.saved(), {}};
+    for (const std::uint64_t number : impl_->views.numbers()) map.views.push_back(impl_->views.saved(number));
+    return map;
+  });
   if (impl_->archive) impl_->archive->add_stored(map);
   return map;
 }
@@ -268,7 +274,7 @@ void Mapper::load(const std::string& path) {
   }
 }
 
-void Mapper::load(const std::vector<Surfel>& surfels) { load(SavedMap{surfels, {}}); }
+void Mapper::load(const std::vector<Surfel>& surfels) { load(SavedMap{surfels, {}, {}}); }
 
 void Mapper::load(const SavedMap& map) {
   on_device([&] { impl_->begin_map(map); });
@@ -284,13 +290,24 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   views.clear(map.size() == 0);
   seen.clear();
   if (config.seen_points) seen.load(has_seen ? saved.seen : filled);
+  load_views(saved.views);
   if (!archive) return;
   archive->clear();
   archive->save_some(static_cast<std::uint32_t>(sequence));
 }
 
+/// What there is no room for becomes seen points, as if it had been kept and forgotten.
+void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
+  for (const SavedView& view : saved) {
+    views.set_current(working_image_of(view), view.T_world_camera);
+    views.keep();
+    if (config.seen_points && views.forgotten()) remembering.remember(*views.forgotten(), views, map.block_size(), seen);
+    commands.forget_times();
+  }
+}
+
 void Mapper::reset() {
-  on_device([&] { impl_->begin_map({}); });
+  on_device([&] { impl_->begin_map(SavedMap()); });
 }
 
 Statistics Mapper::statistics() const {

@@ -11,6 +11,7 @@
 #include "map/surfel_packing.hpp"
 #include "mapper_input.hpp"
 #include "storage/map_folder.hpp"
+#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 
@@ -85,8 +86,10 @@ class MapperArchive : public testing::Test {
     const double block_size = block_size_for(walking().z_max);
     const MapFolder folder(path_, block_size);
     std::vector<Surfel> surfels;
-    for (const BlockKey& block : folder.keys())
-      for (const Surfel& surfel : unpack_block(folder.read(block), block, block_size)) surfels.push_back(surfel);
+    for (const BlockKey& block : folder.keys()) {
+      if (is_view(block)) continue;
+      for (const Surfel& surfel : unpack_block(parts_of(folder.read(block)).surfels, block, block_size)) surfels.push_back(surfel);
+    }
     return sorted(surfels);
   }
 

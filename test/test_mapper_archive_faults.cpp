@@ -125,15 +125,15 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   Mapper plain(walking()), mapper(walking(path_));
   integrate_all(plain, all);
   Follower follower;
-  const auto damage = [&] {
-    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec("UPDATE blocks SET crc = ~crc");
+  const auto change_file = [&](const char* sql) {
+    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec(sql);
   };
   for (const auto& frame : there) mapper.integrate(frame.view());
   follower.apply(mapper.changes(0));
   std::size_t refused = 0;
   for (std::size_t n = there.size(); n < all.size(); ++n) {
     const bool now = n == there.size() + 20;
-    if (now) damage();
+    if (now) change_file("UPDATE blocks SET crc = ~crc");
     for (int tries = 0; tries < 3 && now; ++tries) {
       const std::vector<Surfel> before = mapper.surfels();
       const std::string said = fault_of<FileError>([&] { mapper.integrate(there.front().view()); });
@@ -145,7 +145,7 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
       ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "after a refused frame";
       ++refused;
     }
-    if (now) damage();  // the second inversion restores the checksums
+    if (now) change_file("UPDATE blocks SET crc = ~crc WHERE crc < 0");  // blocks that were written meanwhile are sound
     mapper.integrate(all[n].view());
     follower.apply(mapper.changes(follower.sequence()));
     ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "frame " << n;

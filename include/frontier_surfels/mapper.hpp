@@ -50,8 +50,8 @@ class Mapper {
   /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
-  /// Replaces the map by a saved one; with a map_folder, also the map in the folder. The recent views are forgotten, and so is which
-  /// surfels stand in thin space (the method trusts these a little more from then on), because the file does not have it.
+  /// Replaces the map by a saved one; with a map_folder, also the map in the folder. Mapping then goes on as with the map that was saved. From a
+  /// file without what has been seen, as PCD files are, that is filled in from the surfels.
   /// @throws FileError  the file cannot be used; the map stays as it was
   void load(const std::string& path);
 

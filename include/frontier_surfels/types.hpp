@@ -116,10 +116,19 @@ struct SeenSpace {
   std::vector<Block> blocks;
 };
 
+/// A kept view, as it is saved with a map.
+struct SavedView {
+  Intrinsics intrinsics;                                            ///< of the working image
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();  ///< pose of the optical frame
+  double depth_step = 0;                                            ///< [m]
+  std::vector<std::uint16_t> depth;                                 ///< [height][width], in steps; 0: no measurement
+};
+
 /// A whole map, as files keep it.
 struct SavedMap {
   std::vector<Surfel> surfels;
-  SeenSpace seen;
+  SeenSpace seen;                ///< by views that are no longer kept
+  std::vector<SavedView> views;  ///< the kept ones, oldest first
 };
 
 /// Wall or device time of one stage of the pipeline.

@@ -112,12 +112,16 @@ __kernel void see_points(const Window window, const View view, const int shift, 
   }
 }
 
-// One work item handles a brick: is every point of it seen?
-__kernel void find_full_bricks(__global const int4* seen_by, const int count, __global const ulong* bricks, __global uchar* full) {
+// One work item handles a brick: are none, some or all of its points seen?
+//   out states[count]: SEEN_NONE, SEEN_MIXED or SEEN_ALL
+__kernel void find_brick_states(__global const int4* seen_by, const int count, __global const ulong* bricks, __global uchar* states) {
   const int n = get_global_id(0);
   if (n >= count) return;
   __global const ulong* words = bricks + SEEN_WORDS * seen_by[n].w;
-  ulong all = ~0ul;
-  for (int word = 0; word < SEEN_WORDS; ++word) all &= words[word];
-  full[n] = all == ~0ul ? 1 : 0;
+  ulong all = ~0ul, any = 0;
+  for (int word = 0; word < SEEN_WORDS; ++word) {
+    all &= words[word];
+    any |= words[word];
+  }
+  states[n] = all == ~0ul ? SEEN_ALL : any == 0 ? SEEN_NONE : SEEN_MIXED;
 }

@@ -122,7 +122,7 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
   // A room has whole patches: those of the next room must not cross cache lines, and pixels are read in pairs.
   depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
   if (depths.size() > room_size_) enlarge_rooms(depths.size());
-  current_ = {image.intrinsics, T_world_camera, free_room(), *std::max_element(largest.begin(), largest.end())};
+  current_ = {image.intrinsics, T_world_camera, free_room(), *std::max_element(largest.begin(), largest.end()), ++last_number_};
   forgotten_.reset();
   depths_.send(std::move(depths), current_.room * room_size_);
 }
@@ -183,27 +183,50 @@ bool RecentViews::differs_enough() const {
   });
 }
 
+void RecentViews::forget(const Kept& view) {
+  if (view.deepest > 0) forgotten_ = ForgottenView{view.intrinsics, view.T_world_camera, view.room, view.deepest};
+}
+
 bool RecentViews::keep_current() {
-  const auto forget = [this](const Kept& view) {
-    complete_ = false;
-    if (view.deepest > 0) forgotten_ = ForgottenView{view.intrinsics, view.T_world_camera, view.room, view.deepest};
-  };
-  if (config_.recent_views == 0 || !differs_enough()) {
-    const bool complete = complete_;
-    forget(current_);
-    complete_ = complete;  // the paper's method takes a view that adds little for one that adds nothing
-    return false;
+  if (config_.recent_views > 0 && differs_enough()) {
+    keep();
+    return true;
   }
+  forget(current_);
+  return false;
+}
+
+void RecentViews::keep() {
+  if (config_.recent_views == 0) return forget(current_);
   if (kept_.size() == static_cast<std::size_t>(config_.recent_views)) {
     forget(kept_.back());
     kept_.pop_back();
+    complete_ = false;
   }
   kept_.push_front(current_);
-  return true;
+}
+
+std::vector<std::uint64_t> RecentViews::numbers() const {
+  std::vector<std::uint64_t> numbers;
+  for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) numbers.push_back(kept->number);
+  return numbers;
+}
+
+SavedView RecentViews::saved(std::uint64_t number) const {
+  const auto kept = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& view) { return view.number == number; });
+  const int width = kept->intrinsics.width, height = kept->intrinsics.height, columns = patches(width, PATCH_COLUMNS);
+  const std::vector<cl_ushort> room =
+      depths_.read(static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch, kept->room * room_size_);
+  SavedView view = {kept->intrinsics, kept->T_world_camera, depth_step_, {}};
+  for (int t = 0; t < height; ++t)
+    for (int s = 0; s < width; ++s)
+      view.depth.push_back(room[(static_cast<std::size_t>(t / PATCH_ROWS) * columns + s / PATCH_COLUMNS) * kPatch +
+                                t % PATCH_ROWS * PATCH_COLUMNS + s % PATCH_COLUMNS]);
+  return view;
 }
 
 View RecentViews::view_of(const ForgottenView& view, const Eigen::Isometry3d& T_camera_local) const {
-  return to_view({view.intrinsics, view.T_world_camera, view.room, view.deepest}, T_camera_local);
+  return to_view({view.intrinsics, view.T_world_camera, view.room, view.deepest, 0}, T_camera_local);
 }
 
 }  // namespace frontier_surfels

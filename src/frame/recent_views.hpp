@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "common/shared.h"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/types.hpp"
 #include "opencl/commands.hpp"
 
 namespace frontier_surfels {
@@ -43,6 +45,13 @@ class RecentViews {
   /// Keeps the current view if its camera or pose differs enough from every kept view. @return whether it was kept
   bool keep_current();
 
+  /// Keeps the current view in any case.
+  void keep();
+
+  /// Numbers of the kept views, oldest first: the how-many-th set_current() each came with. They are never used again.
+  std::vector<std::uint64_t> numbers() const;
+  SavedView saved(std::uint64_t number) const;  ///< a kept view
+
   /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on the
   /// device until the next set_current(). None if it has no depth, or if a kept view was not replaced.
   const std::optional<ForgottenView>& forgotten() const { return forgotten_; }
@@ -67,15 +76,18 @@ class RecentViews {
     Eigen::Isometry3d T_world_camera;
     std::size_t room = 0;  ///< row of depths_
     double deepest = 0;    ///< largest depth [m]
+    std::uint64_t number = 0;
   };
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool differs_enough() const;
+  void forget(const Kept& view);
   void enlarge_rooms(std::size_t size);
   std::size_t free_room() const;
 
   Config config_;
   double depth_step_;          ///< [m]
   std::size_t room_size_ = 0;  ///< elements that the largest image so far takes
+  std::uint64_t last_number_ = 0;
   Kept current_;
   std::optional<ForgottenView> forgotten_;
   std::deque<Kept> kept_;  ///< newest first

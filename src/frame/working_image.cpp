@@ -125,4 +125,10 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
   return image;
 }
 
+WorkingImage working_image_of(const SavedView& view) {
+  WorkingImage image = {view.intrinsics, {}, {}};
+  for (const std::uint16_t steps : view.depth) image.depth.push_back(static_cast<float>(steps * view.depth_step));
+  return image;
+}
+
 }  // namespace frontier_surfels

@@ -22,4 +22,7 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b);
 /// @throws BadFrame  a sentence that names what is wrong with the frame
 WorkingImage make_working_image(const DepthFrame& frame, const Config& config);
 
+/// The working image of a saved view.
+WorkingImage working_image_of(const SavedView& view);
+
 }  // namespace frontier_surfels

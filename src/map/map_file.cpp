@@ -27,12 +27,12 @@ void write_map(const std::string& path, const std::vector<Surfel>& surfels) {
 }
 
 void write_map(const std::string& path, const SavedMap& map) {
-  format_of(path) == Format::kPly ? write_ply(path, map.surfels, map.seen) : write_pcd(path, map.surfels);
+  format_of(path) == Format::kPly ? write_ply(path, map) : write_pcd(path, map.surfels);
 }
 
 SavedMap read_saved_map(const std::string& path) {
   if (format_of(path) == Format::kPly) return read_saved_ply(path);
-  return {read_pcd(path), {}};
+  return {read_pcd(path), {}, {}};
 }
 
 std::vector<Surfel> read_map(const std::string& path) { return read_saved_map(path).surfels; }

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "map/surfel_file.hpp"
+#include "map/view_packing.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -19,7 +20,7 @@ struct Record {
 };
 static_assert(sizeof(Record) == 32);
 
-constexpr std::size_t kLongestHeader = 1024;  // [byte]
+constexpr std::size_t kLongestHeader = 2048;  // [byte]
 constexpr char kHeaderEnd[] = "end_header\n";
 
 /// The shortest text that gives the same number, whatever the locale.
@@ -35,6 +36,7 @@ struct Sizes {
   double block_size = 0;  ///< of what has been seen [m]
   int points = 0;         ///< of it, along a block's edge
   std::uint64_t blocks = 0;
+  std::uint64_t views = 0;
 };
 
 std::string header(const Sizes& sizes) {
@@ -49,6 +51,10 @@ std::string header(const Sizes& sizes) {
     text += "element seen_block " + std::to_string(sizes.blocks) + "\n";
     for (const char* name : {"x", "y", "z"}) text += std::string("property int ") + name + "\n";
     text += "property list uint uchar bytes\n";
+    text += "element kept_view " + std::to_string(sizes.views) + "\n";
+    for (const char* name : kViewNumbers) text += std::string("property double ") + name + "\n";
+    for (const char* name : {"width", "height"}) text += std::string("property int ") + name + "\n";
+    text += "property list uint ushort depth\n";
   }
   return text + kHeaderEnd;
 }
@@ -64,6 +70,7 @@ Sizes sizes_of(const std::string& header) {
   sizes.surfels = std::strtoull(after("element vertex "), nullptr, 10);
   sizes.points = static_cast<int>(std::strtoul(after("comment seen_block "), nullptr, 10));
   sizes.blocks = std::strtoull(after("element seen_block "), nullptr, 10);
+  sizes.views = std::strtoull(after("element kept_view "), nullptr, 10);
   const char* size = after(" points ");
   std::from_chars(size, size + std::strlen(size), sizes.block_size);
   return sizes;
@@ -94,19 +101,67 @@ FileError cut_off(const std::string& path, const Sizes& sizes) {
                    " surfels, which its size does not fit.");
 }
 
-/// A block of what has been seen. @param at  where it begins, and then where it ends
-SeenSpace::Block read_block(const std::vector<std::uint8_t>& body, std::size_t* at, const std::string& path, const Sizes& sizes) {
-  SeenSpace::Block block;
-  std::uint32_t size = 0;
-  const std::size_t head = sizeof block.block + sizeof size;
-  if (body.size() - *at < head) throw cut_off(path, sizes);
-  std::memcpy(block.block.data(), &body[*at], sizeof block.block);
-  std::memcpy(&size, &body[*at + sizeof block.block], sizeof size);
-  if (body.size() - *at - head < size) throw cut_off(path, sizes);
-  block.bytes.assign(body.begin() + static_cast<std::ptrdiff_t>(*at + head), body.begin() + static_cast<std::ptrdiff_t>(*at + head + size));
-  *at += head + size;
-  return block;
+void append(std::vector<std::uint8_t>& body, const void* data, std::size_t bytes) {
+  body.insert(body.end(), static_cast<const std::uint8_t*>(data), static_cast<const std::uint8_t*>(data) + bytes);
 }
+
+/// A list: its size, and then its elements.
+template <typename T>
+void append_list(std::vector<std::uint8_t>& body, const std::vector<T>& values) {
+  const auto size = static_cast<std::uint32_t>(values.size());
+  append(body, &size, sizeof size);
+  append(body, values.data(), values.size() * sizeof(T));
+}
+
+void append_block(std::vector<std::uint8_t>& body, const SeenSpace::Block& block) {
+  append(body, block.block.data(), sizeof block.block);
+  append_list(body, block.bytes);
+}
+
+/// Reads a body piece by piece. @throws FileError  it ends too early
+class Pieces {
+ public:
+  Pieces(const std::vector<std::uint8_t>& body, std::size_t at, const std::string& path, const Sizes& sizes)
+      : body_(body), at_(at), path_(path), sizes_(sizes) {}
+
+  void take(void* to, std::size_t bytes) {
+    if (body_.size() - at_ < bytes) throw cut_off(path_, sizes_);
+    if (bytes > 0) std::memcpy(to, &body_[at_], bytes);
+    at_ += bytes;
+  }
+
+  template <typename T>
+  std::vector<T> take_list() {
+    std::uint32_t size = 0;
+    take(&size, sizeof size);
+    if ((body_.size() - at_) / sizeof(T) < size) throw cut_off(path_, sizes_);
+    std::vector<T> values(size);
+    take(values.data(), size * sizeof(T));
+    return values;
+  }
+
+  SeenSpace::Block take_block() {
+    SeenSpace::Block block;
+    take(block.block.data(), sizeof block.block);
+    block.bytes = take_list<std::uint8_t>();
+    return block;
+  }
+
+  SavedView take_view() {
+    std::size_t used = 0;
+    const SavedView view = unpack_view(body_.data() + at_, body_.size() - at_, &used);
+    at_ += used;
+    return view;
+  }
+
+  bool at_end() const { return at_ == body_.size(); }
+
+ private:
+  const std::vector<std::uint8_t>& body_;
+  std::size_t at_;
+  const std::string& path_;
+  const Sizes& sizes_;
+};
 
 /// The header of a file, up to and with its last line.
 std::string read_header(SurfelFile& file, const std::string& path) {
@@ -118,24 +173,23 @@ std::string read_header(SurfelFile& file, const std::string& path) {
 
 }  // namespace
 
-void write_ply(const std::string& path, const std::vector<Surfel>& surfels, const SeenSpace& seen) {
-  check_written(path, surfels);
-  std::vector<std::uint8_t> body(surfels.size() * sizeof(Record));
-  for (std::size_t n = 0; n < surfels.size(); ++n) {
-    const Record record = to_record(surfels[n]);
-    std::memcpy(&body[n * sizeof record], &record, sizeof record);
+void write_ply(const std::string& path, const std::vector<Surfel>& surfels) { write_ply(path, SavedMap{surfels, {}, {}}); }
+
+void write_ply(const std::string& path, const SavedMap& map) {
+  check_written(path, map.surfels);
+  std::vector<std::uint8_t> body;
+  for (const Surfel& surfel : map.surfels) {
+    const Record record = to_record(surfel);
+    append(body, &record, sizeof record);
   }
-  const auto append = [&body](const void* data, std::size_t bytes) {
-    body.insert(body.end(), static_cast<const std::uint8_t*>(data), static_cast<const std::uint8_t*>(data) + bytes);
-  };
-  for (const SeenSpace::Block& block : seen.blocks) {
-    const auto size = static_cast<std::uint32_t>(block.bytes.size());
-    append(block.block.data(), sizeof block.block);
-    append(&size, sizeof size);
-    append(block.bytes.data(), size);
+  for (const SeenSpace::Block& block : map.seen.blocks) append_block(body, block);
+  for (const SavedView& view : map.views) {
+    const std::vector<std::uint8_t> bytes = pack_view(view);
+    append(body, bytes.data(), bytes.size());
   }
-  replace_file(path, header({checksum(body.data(), body.size()), surfels.size(), seen.block_size, seen.points, seen.blocks.size()}),
-               body.data(), body.size());
+  const Sizes sizes = {checksum(body.data(), body.size()), map.surfels.size(),     map.seen.block_size,
+                       map.seen.points,                    map.seen.blocks.size(), map.views.size()};
+  replace_file(path, header(sizes), body.data(), body.size());
 }
 
 std::vector<Surfel> read_ply(const std::string& path) { return read_saved_ply(path).surfels; }
@@ -159,9 +213,10 @@ SavedMap read_saved_ply(const std::string& path) {
     map.surfels[n] = to_surfel(&body[n * sizeof(Record)], static_cast<std::uint32_t>(n));
   check_read(path, map.surfels);
   map.seen = {sizes.block_size, sizes.points, {}};
-  std::size_t at = of_surfels;
-  for (std::uint64_t n = 0; n < sizes.blocks; ++n) map.seen.blocks.push_back(read_block(body, &at, path, sizes));
-  if (at != body.size()) throw cut_off(path, sizes);
+  Pieces pieces(body, of_surfels, path, sizes);
+  for (std::uint64_t n = 0; n < sizes.blocks; ++n) map.seen.blocks.push_back(pieces.take_block());
+  for (std::uint64_t n = 0; n < sizes.views; ++n) map.views.push_back(pieces.take_view());
+  if (!pieces.at_end()) throw cut_off(path, sizes);
   return map;
 }
 

@@ -80,6 +80,7 @@ SeenPoints::SeenPoints(Commands& commands, double block_size)
 }
 
 void SeenPoints::clear() {
+  fixed_ = false;
   table_of_.clear();
   tables_.assign(bricks_of_block(), SEEN_BRICK_EMPTY);
   full_bricks_.assign(1, 0);
@@ -96,18 +97,21 @@ void SeenPoints::clear() {
 }
 
 void SeenPoints::choose_spacing(double spacing) {
-  choose_shift(shift_for_spacing(block_size_, spacing));
+  const int shift = shift_for_spacing(block_size_, spacing);
+  if (fixed_ || !empty() || shift == shift_) return;
+  shift_ = shift;
+  clear();
+}
+
+void SeenPoints::choose_shift(int shift) {
+  shift_ = std::clamp(shift, 0, kMostShift);
+  clear();
+  fixed_ = true;
 }
 
 int SeenPoints::shift_for_spacing(double block_size, double spacing) {
   const double bricks = block_size / (SEEN_BRICK * spacing);
   return std::clamp(static_cast<int>(std::ceil(std::log2(bricks) - 1e-9)), 0, kMostShift);
-}
-
-void SeenPoints::choose_shift(int shift) {
-  if (!empty() || shift == shift_) return;
-  shift_ = shift;
-  clear();
 }
 
 double SeenPoints::spacing() const { return block_size_ / (SEEN_BRICK << shift_); }
@@ -154,12 +158,12 @@ cl_int SeenPoints::add_brick(int table, int brick) {
   return number;
 }
 
-void SeenPoints::set_full(int table, int brick) {
-  const cl_int before = entry(table, brick);
-  if (before == SEEN_BRICK_FULL) return;
-  if (before != SEEN_BRICK_EMPTY) free_.push_back(before);
-  set_entry(table, brick, SEEN_BRICK_FULL);
-  ++full_bricks_[table];
+void SeenPoints::set_uniform(int table, int brick, bool seen) {
+  const cl_int before = entry(table, brick), after = seen ? SEEN_BRICK_FULL : SEEN_BRICK_EMPTY;
+  if (before == after) return;
+  if (before > SEEN_BRICK_FULL) free_.push_back(before);
+  set_entry(table, brick, after);
+  full_bricks_[table] += seen ? 1 : 0;
 }
 
 void SeenPoints::send_entries(const char* stage) {
@@ -233,7 +237,7 @@ void SeenPoints::add_blocks(const std::vector<SeenBlock>& blocks) {
     if (bytes.empty()) continue;
     const int own = table(block);
     for (std::size_t brick = 0; brick < bricks; ++brick) {
-      if (bytes[brick] == SEEN_ALL) set_full(own, static_cast<int>(brick));
+      if (bytes[brick] == SEEN_ALL) set_uniform(own, static_cast<int>(brick), true);
       if (bytes[brick] == SEEN_MIXED) numbers.push_back(add_brick(own, static_cast<int>(brick)));
     }
     const std::size_t before = words.size();

@@ -39,10 +39,10 @@ class SeenPoints {
   /// @param block_size  edge of the map's blocks [m]
   SeenPoints(Commands& commands, double block_size);
 
-  /// Chooses the lattice, if nothing is remembered yet: the distance of its points becomes a block's edge divided by a power of two, and at
-  /// most `spacing` [m], unless that would be below 1 / 1024 of the edge.
+  /// Chooses the lattice, unless choose_shift() has, or something is remembered: the distance of its points becomes a block's edge divided by a
+  /// power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
   void choose_spacing(double spacing);
-  void choose_shift(int shift);         ///< as choose_spacing(), by the logarithm of the number of bricks along a block's edge
+  void choose_shift(int shift);  ///< chooses the lattice of a saved map until clear(); nothing may be remembered
   static int shift_for_spacing(double block_size, double spacing);
   double spacing() const;         ///< distance of the lattice's points [m]
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
@@ -60,7 +60,7 @@ class SeenPoints {
   /// @name Changes of entries. They reach the device with send_entries().
   /// @{
   cl_int add_brick(int table, int brick);      ///< a brick of its own, without seen points, for a place that has none. @return its number
-  void set_full(int table, int brick);  ///< all points of the brick are seen; its own brick, if it has one, becomes free
+  void set_uniform(int table, int brick, bool seen);  ///< all points of the brick are seen, or none; a brick of its own becomes free
   void send_entries(const char* stage);
   /// @}
 
@@ -98,6 +98,7 @@ class SeenPoints {
   Commands& commands_;
   const double block_size_;  ///< [m]
   int shift_ = 2;
+  bool fixed_ = false;  ///< by choose_shift()
   std::unordered_map<BlockKey, int> table_of_;
   std::vector<cl_int> tables_;           ///< the device's tables; the host is their master
   std::vector<int> full_bricks_;         ///< of each table: number of entries that are SEEN_BRICK_FULL

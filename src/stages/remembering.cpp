@@ -7,7 +7,7 @@
 
 namespace frontier_surfels {
 
-Remembering::Remembering(Commands& commands) : commands_(commands), blocks_(commands), seen_by_(commands), found_(commands), full_(commands) {}
+Remembering::Remembering(Commands& commands) : commands_(commands), blocks_(commands), seen_by_(commands), found_(commands), states_(commands) {}
 
 std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, const RecentViews& views, double block_size, SeenPoints& seen) {
   const char* stage = "remembering";
@@ -42,7 +42,7 @@ std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, cons
     if (changed.empty() || changed.back() != key) changed.push_back(key);
     const int table = block.s[3], brick = static_cast<int>(n % bricks);
     if (found[n] == SEEN_ALL) {
-      seen.set_full(table, brick);
+      seen.set_uniform(table, brick, true);
       continue;
     }
     const cl_int before = seen.entry(table, brick);
@@ -57,11 +57,11 @@ std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, cons
   seen_by_.send(std::move(asked));
   commands_.run(stage, "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8), commands_.device().heavy_group(), around.window, view,
                 static_cast<cl_int>(seen.shift()), views.depths(), seen_by_(), asked_count, seen.brick_words());
-  full_.resize(asked_count);
-  commands_.run(stage, "find_full_bricks", asked_count, kGroup, seen_by_(), asked_count, seen.brick_words(), full_());
-  const std::vector<cl_uchar> full = full_.read(asked_count);
-  for (std::size_t n = 0; n < full.size(); ++n)
-    if (full[n]) seen.set_full(places[n].first, places[n].second);
+  states_.resize(asked_count);
+  commands_.run(stage, "find_brick_states", asked_count, kGroup, seen_by_(), asked_count, seen.brick_words(), states_());
+  const std::vector<cl_uchar> states = states_.read(asked_count);
+  for (std::size_t n = 0; n < states.size(); ++n)
+    if (states[n] != SEEN_MIXED) seen.set_uniform(places[n].first, places[n].second, states[n] == SEEN_ALL);
   return changed;
 }
 

@@ -17,7 +17,7 @@ class Remembering {
  private:
   Commands& commands_;
   SentArray<cl_int4> blocks_, seen_by_;
-  DeviceArray<cl_uchar> found_, full_;
+  DeviceArray<cl_uchar> found_, states_;
 };
 
 }  // namespace frontier_surfels

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <utility>
 
 #include "map/surfel_packing.hpp"
+#include "map/view_packing.hpp"
+#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -20,28 +21,6 @@ BlockKey region_of(const BlockKey& block) {
   return {floor_divide(block.x, kRegion), floor_divide(block.y, kRegion), floor_divide(block.z, kRegion)};
 }
 
-/// What the folder keeps of a block: the number of bytes of its surfels, these, and then what has been seen. Nothing if both are empty.
-struct StoredParts {
-  std::vector<std::uint8_t> surfels, seen;
-};
-
-void join(std::vector<std::uint8_t>& surfels, const std::vector<std::uint8_t>& seen) {
-  if (surfels.empty() && seen.empty()) return;
-  const auto size = static_cast<std::uint32_t>(surfels.size());
-  const auto* begin = reinterpret_cast<const std::uint8_t*>(&size);
-  surfels.insert(surfels.begin(), begin, begin + sizeof size);
-  surfels.insert(surfels.end(), seen.begin(), seen.end());
-}
-
-StoredParts parts_of(const std::vector<std::uint8_t>& bytes) {
-  std::uint32_t size = 0;
-  if (bytes.size() >= sizeof size) std::memcpy(&size, bytes.data(), sizeof size);
-  if (bytes.size() < sizeof size + size)
-    throw FileError("A block in the map folder is incomplete: the folder is damaged; use a backup or another folder.");
-  const auto seen = bytes.begin() + static_cast<std::ptrdiff_t>(sizeof size + size);
-  return {{bytes.begin() + sizeof size, seen}, {seen, bytes.end()}};
-}
-
 /// Largest distance along an axis between a point and a cube's centre [m].
 double distance(const Eigen::Vector3d& point, const BlockKey& cube, double size) {
   return (point - (Eigen::Vector3d(cube.x, cube.y, cube.z).array() + 0.5).matrix() * size).cwiseAbs().maxCoeff();
@@ -49,18 +28,35 @@ double distance(const Eigen::Vector3d& point, const BlockKey& cube, double size)
 
 }  // namespace
 
-MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen)
-    : map_(map), seen_(seen), radius_(config.eviction_radius), folder_(config.map_folder, map.block_size()) {
-  for (const BlockKey& block : folder_.keys()) note_stored(block);
+MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views)
+    : map_(map), seen_(seen), views_(views), radius_(config.eviction_radius), folder_(config.map_folder, map.block_size()) {
+  for (const BlockKey& key : folder_.keys()) {
+    if (is_view(key))
+      old_views_.insert(number_of(key));
+    else
+      note_stored(key);
+  }
+  choose_lattice();
 }
 
 MapArchive::~MapArchive() {
   try {
     folder_.flush();
-    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(read(blocks));
+    if (std::vector<StoredBlock> last = read(unsaved()); !last.empty()) folder_.write(std::move(last));
     folder_.flush();
   } catch (const std::exception&) {  // what was saved before is still there
   }
+}
+
+/// The lattice is that of the blocks in the folder. One that can be read is enough.
+void MapArchive::choose_lattice() {
+  for (const auto& [region, blocks] : stored_)
+    for (const BlockKey& block : blocks) {
+      try {
+        return seen_.choose_shift(parts_of(folder_.read(block)).shift);
+      } catch (const FileError&) {  // frames that need the block will tell
+      }
+    }
 }
 
 void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }
@@ -100,13 +96,18 @@ MapArchive::Blocks MapArchive::stored_near(const Eigen::Vector3d& camera, double
 bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   const Blocks near = stored_near(camera, radius);
   std::vector<SeenBlock> seen;
-  for (const BlockKey& block : near) {
-    const StoredParts parts = parts_of(folder_.read(block));
-    map_.add_block(block, parts.surfels, frame);
-    seen.push_back({block, parts.seen});
-    const auto region = stored_.find(region_of(block));
-    region->second.erase(std::find(region->second.begin(), region->second.end(), block));
-    if (region->second.empty()) stored_.erase(region);
+  try {
+    for (const BlockKey& block : near) {
+      const StoredParts parts = parts_of(folder_.read(block));
+      map_.add_block(block, parts.surfels, frame);
+      seen.push_back({block, parts.seen});
+      const auto region = stored_.find(region_of(block));
+      region->second.erase(std::find(region->second.begin(), region->second.end(), block));
+      if (region->second.empty()) stored_.erase(region);
+    }
+  } catch (...) {
+    seen_.add_blocks(seen);  // of the blocks that are in memory now
+    throw;
   }
   seen_.add_blocks(seen);
   return !near.empty();
@@ -147,13 +148,16 @@ MapArchive::Blocks MapArchive::unsaved() const {
 bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame) {
   if (frame < next_try_) return false;
   try {
-    if (!blocks.empty()) folder_.write(read(blocks));
+    if (std::vector<StoredBlock> stored = read(blocks); !stored.empty()) folder_.write(std::move(stored));
   } catch (const std::exception&) {
     fault_ = std::current_exception();
     next_try_ = frame + kSavePeriod;
     return false;
   }
   noted_.clear();
+  old_views_.clear();
+  const std::vector<std::uint64_t> kept = views_.numbers();
+  saved_views_ = {kept.begin(), kept.end()};
   saved_ = mapped;
   return true;
 }
@@ -172,9 +176,31 @@ MapArchive::Blocks MapArchive::in_memory() const {
 /// The blocks as the folder keeps them.
 std::vector<StoredBlock> MapArchive::read(const Blocks& blocks) const {
   std::vector<StoredBlock> stored = map_.read_blocks(blocks);
-  const std::vector<std::vector<std::uint8_t>> seen = seen_.read_blocks(blocks);
-  for (std::size_t n = 0; n < stored.size(); ++n) join(stored[n].second, seen[n]);
+  std::vector<std::vector<std::uint8_t>> seen = seen_.read_blocks(blocks);
+  for (std::size_t n = 0; n < stored.size(); ++n) stored[n].second = join({seen_.shift(), std::move(stored[n].second), std::move(seen[n])});
+  add_views(stored);
   return stored;
+}
+
+/// Adds the views that are kept but not on disk, and erases those on disk that are no longer kept.
+void MapArchive::add_views(std::vector<StoredBlock>& stored) const {
+  const std::vector<std::uint64_t> numbers = views_.numbers();
+  const std::set<std::uint64_t> kept(numbers.begin(), numbers.end());
+  for (const std::set<std::uint64_t>* on_disk : {&old_views_, &saved_views_})
+    for (const std::uint64_t number : *on_disk)
+      if (kept.count(number) == 0) stored.push_back({view_key(number), {}});
+  for (const std::uint64_t number : numbers)
+    if (saved_views_.count(number) == 0) stored.push_back({view_key(number), pack_view(views_.saved(number))});
+}
+
+std::vector<SavedView> MapArchive::stored_views() const {
+  std::vector<SavedView> views;
+  for (const std::uint64_t number : old_views_) {
+    const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
+    std::size_t used = 0;
+    views.push_back(unpack_view(bytes.data(), bytes.size(), &used));
+  }
+  return views;
 }
 
 void MapArchive::add_stored(SavedMap& map) const {
@@ -195,6 +221,8 @@ void MapArchive::clear() {
   followed_.reset();
   noted_.clear();
   fault_ = nullptr;
+  saved_views_.clear();
+  old_views_.clear();
   saved_ = next_try_ = 0;
 }
 

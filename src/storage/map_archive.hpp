@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "frame/recent_views.hpp"
 #include "frontier_surfels/config.hpp"
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
@@ -21,7 +22,7 @@ namespace frontier_surfels {
 class MapArchive {
  public:
   /// @throws FileError  config.map_folder cannot be used
-  MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen);
+  MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views);
   ~MapArchive();  ///< writes what is in memory
 
   /// Are there blocks of an earlier map?
@@ -39,6 +40,9 @@ class MapArchive {
   /// Writes the blocks that have changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
 
+  /// The kept views of an earlier map, oldest first. @throws FileError
+  std::vector<SavedView> stored_views() const;
+
   /// Adds what is on disk only. @throws FileError
   void add_stored(SavedMap& map) const;
 
@@ -47,6 +51,7 @@ class MapArchive {
 
  private:
   using Blocks = std::vector<BlockKey>;
+  void choose_lattice();
   void note_stored(const BlockKey& block);
   Blocks stored_near(const Eigen::Vector3d& camera, double radius) const;
   bool fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
@@ -54,15 +59,19 @@ class MapArchive {
   Blocks unsaved() const;
   Blocks in_memory() const;
   std::vector<StoredBlock> read(const Blocks& blocks) const;
+  void add_views(std::vector<StoredBlock>& stored) const;
   bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
 
   SurfelMap& map_;
   SeenPoints& seen_;
+  const RecentViews& views_;
   const double radius_;  ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
   std::optional<Eigen::Vector3d> followed_;      ///< where the camera was when blocks last came and went
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
+  std::set<std::uint64_t> saved_views_;          ///< numbers of the views on disk
+  std::set<std::uint64_t> old_views_;            ///< of those on disk that an earlier process has kept
   std::set<BlockKey> noted_;                    ///< since the last save
   std::exception_ptr fault_;                     ///< of a save that failed
   std::uint32_t saved_ = 0;                      ///< frame of the last save

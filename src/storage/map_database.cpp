@@ -20,7 +20,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::int64_t kApplication = 0x46537266;  ///< tells our databases from other programs'
-constexpr std::int64_t kVersion = 1;               ///< of the tables below
+constexpr std::int64_t kVersion = 2;               ///< of the tables below, and of the bytes of a block
 
 constexpr char kTables[] =
     "CREATE TABLE meta (version INTEGER NOT NULL, block_size REAL NOT NULL);"
@@ -87,6 +87,10 @@ void check_tables(const SQLite::Database& database, const std::string& folder, d
     throw FileError(named(folder) + " has a map.sqlite of another program: give another folder.");
   }
   const std::int64_t version = number(database, "SELECT version FROM meta");
+  if (version < kVersion) {
+    throw FileError(named(folder) + " was written by an older version, which did not store what has been seen (format " +
+                    std::to_string(version) + "): save its map as a file with that version, and load the file with this one.");
+  }
   if (version != kVersion) {
     throw FileError(named(folder) + " was written by a newer version (format " + std::to_string(version) + ", not " +
                     std::to_string(kVersion) + "): update this one, or give another folder.");

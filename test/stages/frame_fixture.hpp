@@ -21,6 +21,7 @@ class FrameFixture {
         limits_(make_limits(config)),
         lists_(commands),
         map_(commands, lists_, config),
+        seen_(commands, map_.block_size()),
         views_(commands, config),
         cameras_(commands, config),
         access_(commands, map_) {
@@ -31,9 +32,10 @@ class FrameFixture {
   const Frame& begin(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
     camera_ = &cameras_.find(image.intrinsics);
     map_.open_window(camera_->grid(), T_world_camera);
+    seen_.open_window(map_.window());
     camera_->set_image(image);
     views_.set_current(image, T_world_camera);
-    frame_ = make_frame(*camera_, map_.window(), views_, limits_);
+    frame_ = make_frame(*camera_, map_.window(), views_, seen_, limits_);
     return frame_;
   }
 
@@ -45,6 +47,7 @@ class FrameFixture {
   Lists& lists() { return lists_; }
   SurfelMap& map() { return map_; }
   const SurfelMap& map() const { return map_; }
+  SeenPoints& seen() { return seen_; }
   RecentViews& views() { return views_; }
   MapAccess& access() { return access_; }
   const MapAccess& access() const { return access_; }
@@ -99,6 +102,7 @@ class FrameFixture {
   const Limits limits_;
   Lists lists_;
   SurfelMap map_;
+  SeenPoints seen_;
   RecentViews views_;
   Cameras cameras_;
   MapAccess access_;

@@ -1,0 +1,23 @@
+/// Kept views as bytes, for files and for the map folder.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels {
+
+/// Numbers of a view (double), in the order of its bytes: T_world_camera column by column without the last row, the intrinsics, and the step of
+/// the depths. Width and height (int32), the number of depths (uint32) and the depths (uint16) follow.
+constexpr const char* kViewNumbers[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy",        "zz",
+                                        "tx", "ty", "tz", "fx", "fy", "cx", "cy", "depth_step"};
+
+std::vector<std::uint8_t> pack_view(const SavedView& view);
+
+/// @param used  [out] number of bytes that the view takes
+/// @throws FileError  the bytes end too early, or the view has no camera, pose or depths
+SavedView unpack_view(const std::uint8_t* bytes, std::size_t size, std::size_t* used);
+
+}  // namespace frontier_surfels

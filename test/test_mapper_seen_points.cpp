@@ -1,0 +1,169 @@
+/// Maps whose views have been forgotten: nothing is lost but a little sharpness, and saved maps go on as if nothing had happened.
+#include "frontier_surfels/map_file.hpp"
+#include "mapper_archive_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+Config few_views(int recent_views) {
+  Config config = undecimated();
+  config.recent_views = recent_views;
+  return config;
+}
+
+bool has_stage(const Report& report, const std::string& name) {
+  return std::any_of(report.stages.begin(), report.stages.end(), [&](const StageTime& stage) { return stage.name == name; });
+}
+
+/// A camera that hovers: it moves to and fro by a millimetre, less than what makes a view worth keeping.
+Frames hovering_frames(int count) {
+  const replay::Room room;
+  const Frames orbit = orbit_frames(coarse_camera(), 1);
+  Frames frames;
+  for (int n = 0; n < count; ++n) {
+    const Eigen::Translation3d motion(0.001 * std::sin(n), 0.001 * std::cos(1.7 * n), 0.001 * std::sin(2.3 * n));
+    frames.push_back(room_frame(room, coarse_camera(), motion * orbit.front().T_world_camera));
+  }
+  return frames;
+}
+
+TEST(MapperSeenPoints, ForgottenViewsAreHardlyMissed) {
+  const Frames frames = orbit_frames(coarse_camera(), 60, 2);
+  const Config config = undecimated();
+  const auto all_kept = map_of(frames, few_views(700)), few_kept = map_of(frames, few_views(5)), none_kept = map_of(frames, few_views(0));
+  const auto expected = score(all_kept, frames, config);
+  for (const auto& surfels : {few_kept, none_kept}) {
+    const auto s = score(surfels, frames, config);
+    SCOPED_TRACE(text(s, surfels.size()));
+    EXPECT_GT(s.right, expected.right - 0.01);
+    EXPECT_LT(s.fdr_5cm, expected.fdr_5cm + 0.001);
+    EXPECT_LT(s.miss_5cm, expected.miss_5cm + 0.001);
+  }
+}
+
+TEST(MapperSeenPoints, AHoveringCameraLeavesNoWrongSurfels) {
+  const Frames frames = hovering_frames(30);
+  const auto surfels = map_of(frames, undecimated());
+  const auto s = score(surfels, frames, undecimated());
+  EXPECT_GT(s.right, 0.99) << text(s, surfels.size());
+}
+
+TEST(MapperSeenPoints, AStillCameraFillsNothing) {
+  const Frames frames = orbit_frames(coarse_camera(), 1);
+  Mapper mapper(few_views(3));
+  for (int n = 0; n < 3; ++n) mapper.integrate(frames.front().view());
+  const Statistics before = mapper.statistics();
+  for (int n = 0; n < 20; ++n) mapper.integrate(frames.front().view());
+  EXPECT_EQ(mapper.statistics().seen_bytes, before.seen_bytes);
+  EXPECT_EQ(mapper.statistics().device_bytes, before.device_bytes);
+  EXPECT_EQ(mapper.statistics().surfels, before.surfels);
+}
+
+TEST(MapperSeenPoints, TheSurfelsAreNotAskedWhatIsKnown) {
+  const Frames frames = orbit_frames(coarse_camera(), 8, 5);
+  Mapper mapper(few_views(2));
+  for (const auto& frame : frames) EXPECT_FALSE(has_stage(mapper.integrate(frame.view()), "sign_field"));
+  Config paper = few_views(2);
+  paper.seen_points = false;
+  Mapper as_in_the_paper(paper);
+  Report last;
+  for (const auto& frame : frames) last = as_in_the_paper.integrate(frame.view());
+  EXPECT_TRUE(has_stage(last, "sign_field"));
+  EXPECT_FALSE(has_stage(last, "remembering"));
+  EXPECT_LT(mapper.statistics().device_bytes, as_in_the_paper.statistics().device_bytes);
+}
+
+TEST(MapperSeenPoints, TheSameForAnyNumberOfThreads) {
+  const Frames frames = orbit_frames(coarse_camera(), 30, 3);
+  Config one = few_views(4), two = few_views(4);
+  one.threads = 1;
+  two.threads = 2;
+  const auto surfels = map_of(frames, one);
+  EXPECT_TRUE(same(surfels, map_of(frames, two)));
+  EXPECT_TRUE(same(surfels, map_of(frames, few_views(4))));
+}
+
+/// A map that is saved and loaded in the middle, by a file or without one.
+class SavedInTheMiddle : public MapperArchive {
+ protected:
+  const Frames frames_ = orbit_frames(coarse_camera(), 40, 3);
+  const Frames first_{frames_.begin(), frames_.begin() + 20}, second_{frames_.begin() + 20, frames_.end()};
+  Mapper whole_{few_views(6)}, half_{few_views(6)};
+
+  void SetUp() override {
+    MapperArchive::SetUp();
+    integrate_all(whole_, frames_);
+    integrate_all(half_, first_);
+  }
+};
+
+TEST_F(SavedInTheMiddle, GoesOnAsIfNothingHadHappened) {
+  Mapper other(few_views(6));
+  other.load(half_.saved_map());
+  integrate_all(other, second_);
+  EXPECT_TRUE(same(sorted(other.surfels()), sorted(whole_.surfels())));
+}
+
+TEST_F(SavedInTheMiddle, AlsoFromAFile) {
+  const std::string file = (root_ / "half.ply").string();
+  half_.save(file);
+  Mapper other(few_views(6));
+  other.load(file);
+  integrate_all(other, second_);
+  EXPECT_TRUE(same(sorted(other.surfels()), sorted(whole_.surfels())));
+}
+
+TEST_F(SavedInTheMiddle, SavingChangesNothing) {
+  half_.save((root_ / "half.ply").string());
+  integrate_all(half_, second_);
+  EXPECT_TRUE(same(half_.surfels(), whole_.surfels()));
+}
+
+TEST_F(SavedInTheMiddle, FewerViewsThanWereSaved) {
+  Mapper other(few_views(2));
+  other.load(half_.saved_map());
+  integrate_all(other, second_);
+  const auto s = score(other.surfels(), frames_, undecimated()), expected = score(whole_.surfels(), frames_, undecimated());
+  EXPECT_GT(s.right, expected.right - 0.01) << text(s, other.size());
+}
+
+/// Only the surfels are there: what has been seen is filled in.
+TEST_F(SavedInTheMiddle, SurfelsAlone) {
+  Mapper other(few_views(6));
+  other.load(half_.surfels());
+  integrate_all(other, second_);
+  const auto s = score(other.surfels(), frames_, undecimated());
+  SCOPED_TRACE(text(s, other.size()));
+  EXPECT_GT(s.right, 0.97);
+  EXPECT_LT(s.miss_5cm, 0.01);
+  EXPECT_GT(other.statistics().seen_bytes, 0u);
+}
+
+TEST_F(SavedInTheMiddle, DamageIsRefused) {
+  SavedMap map = half_.saved_map();
+  ASSERT_FALSE(map.seen.blocks.empty());
+  map.seen.blocks.front().bytes.push_back(0);
+  Mapper other(few_views(6));
+  integrate_all(other, second_);
+  const auto before = other.surfels();
+  EXPECT_THROW(other.load(map), FileError);
+  EXPECT_TRUE(same(other.surfels(), before));
+}
+
+TEST_F(SavedInTheMiddle, InAMapFolder) {
+  Config config = few_views(6);
+  config.map_folder = path_;
+  for (const Frames* half : {&first_, &second_}) {
+    Mapper mapper(config);
+    integrate_all(mapper, *half);
+  }
+  const Mapper reopened(config);
+  SavedMap map = reopened.saved_map();
+  EXPECT_TRUE(same(sorted(map.surfels), sorted(whole_.surfels())));
+  const SavedMap expected = whole_.saved_map();
+  EXPECT_EQ(map.views.size(), expected.views.size());
+  EXPECT_EQ(map.seen.blocks.size(), expected.seen.blocks.size());
+}
+
+}  // namespace
+}  // namespace frontier_surfels
