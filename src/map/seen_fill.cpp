@@ -16,6 +16,11 @@ namespace {
 constexpr int kPoints = SEEN_BRICK * SEEN_BRICK * SEEN_BRICK;  // of a brick
 constexpr int kWhole = kPoints;                                // stands for all points of a brick without surfels
 
+// Points behind surfels are unseen only if several surfels say so, and not by a hair: a surfel alone is more likely a wrong one, and a wrong
+// unseen point makes all points around it unseen, too.
+constexpr double kLeastWeight = 0.5;  // sum of the surfels' weights, which are 1 at most
+constexpr double kLeastDepth = 0.2;   // mean depth behind the discs [spacing]
+
 enum : std::uint8_t { kOpen = 0, kSeen = 1, kUnseen = 2 };
 
 /// Points are numbered (z SEEN_BRICK + y) SEEN_BRICK + x.
@@ -106,7 +111,7 @@ void Filling::label_near_surfels() {
 /// The label of a point is the sign of the sum of (1 - d^2 / (2 s)^2)^4 (h - r / 4): d is the distance to a surfel, s its scale, and h the
 /// height above its disc. Surfels stand a quarter of their radius before the boundary.
 void Filling::label_points(Brick& brick) const {
-  std::vector<double> sums(kPoints, 0.0);
+  std::vector<double> sums(kPoints, 0.0), weights(kPoints, 0.0);
   const Eigen::Array3d corner = Eigen::Array3d(brick.key.x, brick.key.y, brick.key.z) * SEEN_BRICK + 0.5;  // the first point [spacing]
   for (const std::uint32_t number : brick.surfels) {
     const Surfel& surfel = surfels_[number];
@@ -119,11 +124,18 @@ void Filling::label_points(Brick& brick) const {
         for (int x = first.x(); x <= last.x(); ++x) {
           const Eigen::Vector3d d = (corner + Eigen::Array3d(x, y, z)).matrix() * spacing_ - p;
           const double share = 1 - d.squaredNorm() / (reach * reach);
-          if (share > 0) sums[(z * SEEN_BRICK + y) * SEEN_BRICK + x] += share * share * share * share * (normal.dot(d) - surfel.radius / 4);
+          if (share <= 0) continue;
+          const int point = (z * SEEN_BRICK + y) * SEEN_BRICK + x;
+          const double weight = share * share * share * share;
+          weights[point] += weight;
+          sums[point] += weight * (normal.dot(d) - surfel.radius / 4);
         }
   }
   brick.labels.resize(kPoints);
-  std::transform(sums.begin(), sums.end(), brick.labels.begin(), [](double sum) { return sum > 0 ? kSeen : sum < 0 ? kUnseen : kOpen; });
+  for (int n = 0; n < kPoints; ++n) {
+    const bool unseen = sums[n] < -kLeastDepth * spacing_ * weights[n] && weights[n] > kLeastWeight;
+    brick.labels[n] = sums[n] > 0 ? kSeen : unseen ? kUnseen : kOpen;
+  }
 }
 
 void Filling::begin_search() {
