@@ -13,7 +13,7 @@ import unittest
 
 PROGRAM, MAKE_SYNTHETIC, BENCH_TABLE = None, None, None
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
-SECTIONS = ['frames', 'stages', 'octomap', 'map_size', 'start', 'memory']
+SECTIONS = ['frames', 'stages', 'octomap', 'map_size', 'long', 'start', 'memory']
 
 
 def run(*arguments):

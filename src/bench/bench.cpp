@@ -18,6 +18,7 @@ const std::vector<Section>& sections() {
       {"stages", "one frame repeated: the steadiest times of the stages", measure_stages},
       {"octomap", "OctoMap's insertPointCloud on the same frames, for comparison", measure_octomap},
       {"map_size", "frames in maps of 1 to 50 million surfels", measure_map_size},
+      {"long", "10 000 frames to and fro, in windows of 500: time, and the exact test of the map", measure_long},
       {"start", "start-up with and without compiled kernels in the cache", measure_start},
       {"memory", "memory of the map, of everything else on the device, and of the process", measure_memory},
   };
@@ -46,6 +47,9 @@ void declare_options(CLI::App& app, Options& options) {
   app.add_option("--octomap-frames", options.octomap_frames, "number of frames for OctoMap, evenly spaced, default 20; 0: all")
       ->type_name("N")
       ->check(CLI::NonNegativeNumber);
+  app.add_option("--long-frames", options.long_frames, "number of frames of the section long, default 10000")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
   app.add_option("--row-seconds", options.row_seconds, "end a row of a table after S seconds, default 120")
       ->type_name("S")
       ->check(CLI::PositiveNumber);

@@ -23,6 +23,7 @@ nlohmann::ordered_json measure_frames(const Options& options, const std::vector<
 nlohmann::ordered_json measure_stages(const Options& options, const std::vector<Input>& inputs);
 nlohmann::ordered_json measure_octomap(const Options& options, const std::vector<Input>& inputs);
 nlohmann::ordered_json measure_map_size(const Options& options, const std::vector<Input>& inputs);
+nlohmann::ordered_json measure_long(const Options& options, const std::vector<Input>& inputs);
 nlohmann::ordered_json measure_start(const Options& options, const std::vector<Input>& inputs);
 nlohmann::ordered_json measure_memory(const Options& options, const std::vector<Input>& inputs);
 

@@ -45,6 +45,7 @@ Report to_report(const FrameReport& message) {
   report.removed = message.removed;
   report.split = message.split;
   report.map_bytes = message.map_bytes;
+  report.seen_bytes = message.seen_bytes;
   report.device_bytes = message.device_bytes;
   report.view_kept = message.view_kept;
   report.total_ms = message.total_ms;
@@ -60,6 +61,7 @@ Statistics statistics_of(const std::vector<Surfel>& surfels, const Report& last)
       std::count_if(surfels.begin(), surfels.end(), [](const Surfel& surfel) { return surfel.label == Label::kOccupied; }));
   statistics.frontier = statistics.surfels - statistics.occupied;
   statistics.map_bytes = last.map_bytes;
+  statistics.seen_bytes = last.seen_bytes;
   statistics.device_bytes = last.device_bytes;
   return statistics;
 }

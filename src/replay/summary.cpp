@@ -122,7 +122,8 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
   json["surfels"] = {{"total", run.statistics.surfels},
                      {"occupied", run.statistics.occupied},
                      {"frontier", run.statistics.frontier},
-                     {"map_bytes", run.statistics.map_bytes}};
+                     {"map_bytes", run.statistics.map_bytes},
+                     {"seen_bytes", run.statistics.seen_bytes}};
   json["time_ms"] = time_json(warm, stage_names(run.frames));
   json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
   if (scores.octomap) {

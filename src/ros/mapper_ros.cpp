@@ -160,7 +160,7 @@ void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
     const FrameReport message = integrate(camera, image);
     reports_.publish(message);
     diagnostics_->add(message);
-    diagnostics_->set_memory(message.map_bytes, message.device_bytes);
+    diagnostics_->set_memory(message.map_bytes, message.seen_bytes, message.device_bytes);
   } catch (const DroppedFrame& fault) {
     drop(fault.result, fault.what());
   } catch (const BadFrame& fault) {

@@ -75,9 +75,10 @@ void MapperDiagnostics::warn(const FrameReport& report) {
   ROS_WARN("%s (%lu depth image%s dropped)", report.reason.c_str(), static_cast<unsigned long>(since), since == 1 ? "" : "s");
 }
 
-void MapperDiagnostics::set_memory(std::size_t map_bytes, std::size_t device_bytes) {
+void MapperDiagnostics::set_memory(std::size_t map_bytes, std::size_t seen_bytes, std::size_t device_bytes) {
   const std::lock_guard<std::mutex> lock(mutex_);
   map_bytes_ = map_bytes;
+  seen_bytes_ = seen_bytes;
   device_bytes_ = device_bytes;
 }
 
@@ -112,6 +113,7 @@ void MapperDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& status
   for (std::uint8_t result = 0; result < kResults; ++result) status.add(std::string("frames ") + result_name(result), counts_[result]);
   status.add("surfels", surfels_);
   status.addf("memory of the map [MB]", "%.1f", map_bytes_ / 1e6);
+  status.addf("memory of what has been seen [MB]", "%.1f", seen_bytes_ / 1e6);
   status.addf("memory on the device [MB]", "%.1f", device_bytes_ / 1e6);
   status.add("device", device_);
 }

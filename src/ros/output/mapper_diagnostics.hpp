@@ -27,7 +27,7 @@ class MapperDiagnostics {
   void add(const FrameReport& report);
 
   /// Sets the memory of the map and on the device [byte].
-  void set_memory(std::size_t map_bytes, std::size_t device_bytes);
+  void set_memory(std::size_t map_bytes, std::size_t seen_bytes, std::size_t device_bytes);
   void set_paused(bool paused);
 
  private:
@@ -43,7 +43,7 @@ class MapperDiagnostics {
   std::array<std::uint64_t, kResults> counts_told_ = {};
   std::array<Clock::time_point, kResults> warned_ = {};
   std::deque<std::pair<Clock::time_point, double>> mapped_;  ///< frames of the last seconds: time and total_ms
-  std::size_t surfels_ = 0, map_bytes_ = 0, device_bytes_ = 0;
+  std::size_t surfels_ = 0, map_bytes_ = 0, seen_bytes_ = 0, device_bytes_ = 0;
   bool paused_ = false;
   std::string last_reason_;
   diagnostic_updater::Updater updater_;

@@ -198,6 +198,7 @@ FrameReport to_message(const Report& report) {
   message.removed = count32(report.removed);
   message.split = count32(report.split);
   message.map_bytes = report.map_bytes;
+  message.seen_bytes = report.seen_bytes;
   message.device_bytes = report.device_bytes;
   message.view_kept = report.view_kept;
   message.total_ms = report.total_ms;
