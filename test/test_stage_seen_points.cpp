@@ -144,6 +144,27 @@ TEST_F(SeenPointsTest, BlocksComeAndGo) {
   expect_right_points();
 }
 
+TEST_F(SeenPointsTest, PointsInABoxAreForgotten) {
+  remember(cameras().front(), 3, 0.02, Content::mixed, true);
+  const SeenBits before(fixture_->seen().saved());
+  const Eigen::Vector3d center = T_world_start_ * Eigen::Vector3d(0, 0, 0.4 * camera_.config.z_max);
+  const Eigen::AlignedBox3d box(center - Eigen::Vector3d(0.31, 0.72, 0.5), center + Eigen::Vector3d(0.4, 0.7, 0.33));
+  fixture_->seen().forget(box);
+  const SeenBits after(fixture_->seen().saved());
+  const int n = before.points();
+  std::size_t forgotten = 0;
+  for (const auto& [block, bytes] : before.blocks())
+    for (int z = block.z * n; z < (block.z + 1) * n; ++z)
+      for (int y = block.y * n; y < (block.y + 1) * n; ++y)
+        for (int x = block.x * n; x < (block.x + 1) * n; ++x) {
+          const Eigen::Vector3d p = (Eigen::Array3d(x, y, z) + 0.5).matrix() * before.spacing();
+          if ((p - box.min()).cwiseAbs().minCoeff() < 1e-6 || (p - box.max()).cwiseAbs().minCoeff() < 1e-6) continue;
+          ASSERT_EQ(after.seen(x, y, z), before.seen(x, y, z) && !box.contains(p));
+          forgotten += before.seen(x, y, z) && box.contains(p);
+        }
+  EXPECT_GT(forgotten, 0u);
+}
+
 TEST_F(SeenPointsTest, DamagedBlocksAreRefused) {
   remember(cameras().front(), 1, 0.02, Content::mixed, true);
   SeenSpace saved = fixture_->seen().saved();

@@ -142,6 +142,7 @@ int SeenPoints::table(const BlockKey& block) {
 
 void SeenPoints::set_entry(int table, int brick, cl_int value) {
   const std::size_t place = at(table, brick);
+  full_bricks_[table] += (value == SEEN_BRICK_FULL ? 1 : 0) - (tables_[place] == SEEN_BRICK_FULL ? 1 : 0);
   tables_[place] = value;
   changed_places_.push_back(static_cast<cl_int>(place));
 }
@@ -163,7 +164,6 @@ void SeenPoints::set_uniform(int table, int brick, bool seen) {
   if (before == after) return;
   if (before > SEEN_BRICK_FULL) free_.push_back(before);
   set_entry(table, brick, after);
-  full_bricks_[table] += seen ? 1 : 0;
 }
 
 void SeenPoints::send_entries(const char* stage) {
@@ -183,6 +183,54 @@ void SeenPoints::send_entries(const char* stage) {
   changed_places_.clear();
   commands_.run(stage, "set_seen_bricks", SEEN_WORDS * static_cast<std::size_t>(count), kGroup, entries_(), count, tables_on_device_(),
                 bricks_());
+}
+
+/// Points along an axis between two coordinates [m], counted from the world's origin: first, and one past the last.
+static Eigen::Array2i points_between(double low, double high, double spacing) {
+  return {static_cast<int>(std::ceil(low / spacing - 0.5)), static_cast<int>(std::floor(high / spacing - 0.5)) + 1};
+}
+
+void SeenPoints::forget(const Eigen::AlignedBox3d& box) {
+  const int points = SEEN_BRICK << shift_;
+  Eigen::Array<int, 3, 2> range;  // of points
+  for (int axis = 0; axis < 3; ++axis) range.row(axis) = points_between(box.min()[axis], box.max()[axis], spacing()).transpose();
+  std::vector<std::pair<BlockKey, int>> tables(table_of_.begin(), table_of_.end());
+  std::sort(tables.begin(), tables.end());
+  std::vector<PartlyForgotten> partly;
+  for (const auto& [key, table] : tables)
+    for (int brick = 0; brick < bricks_of_block(); ++brick) {
+      const int sides = (1 << shift_) - 1;
+      const Eigen::Array3i low = Eigen::Array3i(key.x, key.y, key.z) * points +
+                                 Eigen::Array3i(brick & sides, brick >> shift_ & sides, brick >> 2 * shift_) * SEEN_BRICK;
+      const Eigen::Array3i first = (range.col(0) - low).max(0), last = (range.col(1) - low).min(SEEN_BRICK);
+      const cl_int before = entry(table, brick);
+      if ((first >= last).any() || before == SEEN_BRICK_EMPTY) continue;
+      if ((first == 0).all() && (last == SEEN_BRICK).all()) {
+        set_uniform(table, brick, false);
+        continue;
+      }
+      const bool was_full = before == SEEN_BRICK_FULL;
+      partly.push_back({table, brick, was_full ? add_brick(table, brick) : before, was_full, first, last});
+    }
+  send_entries("forgetting");
+  forget_points(partly);
+}
+
+void SeenPoints::forget_points(const std::vector<PartlyForgotten>& partly) {
+  if (partly.empty()) return;
+  std::vector<cl_int8> ranges;
+  for (const PartlyForgotten& p : partly)
+    ranges.push_back({{p.first.x(), p.first.y(), p.first.z(), p.number, p.last.x(), p.last.y(), p.last.z(), p.was_full ? 1 : 0}});
+  const auto count = static_cast<cl_int>(ranges.size());
+  DeviceArray<cl_int8> on_device(commands_);
+  DeviceArray<cl_uchar> empty(commands_);
+  on_device.write(ranges);
+  empty.resize(ranges.size());
+  commands_.run("forgetting", "forget_points", SEEN_WORDS * ranges.size(), kGroup, on_device(), count, bricks_());
+  commands_.run("forgetting", "find_empty_bricks", ranges.size(), kGroup, on_device(), count, bricks_(), empty());
+  const std::vector<cl_uchar> are_empty = empty.read(ranges.size());
+  for (std::size_t n = 0; n < are_empty.size(); ++n)
+    if (are_empty[n]) set_uniform(partly[n].table, partly[n].brick, false);
 }
 
 std::vector<BlockKey> SeenPoints::blocks_with_points() const {
@@ -262,7 +310,6 @@ void SeenPoints::drop_block(const BlockKey& block) {
     if (number > SEEN_BRICK_FULL) free_.push_back(number);
     set_entry(found->second, brick, SEEN_BRICK_EMPTY);
   }
-  full_bricks_[found->second] = 0;
   free_tables_.push_back(found->second);
   table_of_.erase(found);
 }

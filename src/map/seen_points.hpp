@@ -2,6 +2,7 @@
 /// the buffers: blocks of the map have tables of bricks, and bricks have a bit for each point of the lattice.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
 #include <unordered_map>
@@ -81,6 +82,9 @@ class SeenPoints {
   void load(const SeenSpace& seen);  ///< into an empty memory
   /// @}
 
+  /// Forgets the points in a box of the world [m].
+  void forget(const Eigen::AlignedBox3d& box);
+
   void clear();
 
   std::size_t bytes() const;  ///< memory on the device and the host
@@ -93,6 +97,14 @@ class SeenPoints {
 
  private:
   std::size_t at(int table, int brick) const { return (static_cast<std::size_t>(table) << (3 * shift_)) + brick; }
+  /// A brick of which some points are forgotten: first, and one past the last along each axis.
+  struct PartlyForgotten {
+    int table, brick;
+    cl_int number;  ///< of its own brick
+    bool was_full;  ///< before it got that
+    Eigen::Array3i first, last;
+  };
+  void forget_points(const std::vector<PartlyForgotten>& partly);
   void set_entry(int table, int brick, cl_int value);
 
   Commands& commands_;
