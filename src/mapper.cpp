@@ -235,14 +235,15 @@ Changes Mapper::changes(std::uint64_t since) const {
   return changes;
 }
 
-void Mapper::save(const std::string& path) const {
+std::vector<Surfel> Mapper::whole_map() const {
   std::vector<Surfel> all = surfels();
-  if (impl_->archive) {
-    const std::vector<Surfel> stored = impl_->archive->stored();
-    all.insert(all.end(), stored.begin(), stored.end());
-  }
-  write_map(path, all);
+  if (!impl_->archive) return all;
+  const std::vector<Surfel> stored = impl_->archive->stored();
+  all.insert(all.end(), stored.begin(), stored.end());
+  return all;
 }
+
+void Mapper::save(const std::string& path) const { write_map(path, whole_map()); }
 
 void Mapper::load(const std::string& path) {
   const std::vector<Surfel> surfels = read_map(path);
@@ -274,7 +275,7 @@ void Mapper::reset() {
 
 Statistics Mapper::statistics() const {
   Statistics statistics;
-  for (const Surfel& surfel : surfels()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
+  for (const Surfel& surfel : whole_map()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
   statistics.surfels = statistics.occupied + statistics.frontier;
   statistics.map_bytes = impl_->map.bytes();
   statistics.device_bytes = impl_->device_bytes();

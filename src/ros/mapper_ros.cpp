@@ -12,6 +12,7 @@
 #include <std_srvs/Trigger.h>
 
 #include <atomic>
+#include <filesystem>
 #include <future>
 
 #include "frontier_surfels/map_file.hpp"
@@ -255,7 +256,10 @@ bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBo
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
-    const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
+    const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
+    if (surfels.empty() && std::filesystem::exists(request.path))
+      throw FileError("The map is empty, and was not written over the existing file " + request.path +
+                      ": delete the file, or choose another path.");
     write_map(request.path, surfels);  // on this thread, so that mapping goes on
     return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
   });
