@@ -104,7 +104,7 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
   poses_.start(nh_);
-  for (const auto& camera : cameras_) camera->start(nh_);
+  for (const auto& camera : cameras_) camera->start(nh_, pnh_);
   worker_->start();
   start_services();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());

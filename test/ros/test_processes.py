@@ -11,10 +11,11 @@ from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
 
-from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
-from synthetic_camera import Camera
+from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
+from synthetic_camera import Camera, compressed_depth
 
-REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info']
+REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info',
+              'color/image:=camera/color/image']
 
 
 class Processes(unittest.TestCase):
@@ -44,7 +45,18 @@ class Processes(unittest.TestCase):
         self.check_refused('no-such-platform', platform='no-such-platform')
 
     def test_no_such_transport(self):
-        self.check_refused('carrier_pigeon.*install', image_transport='carrier_pigeon')
+        self.check_refused("~image_transport is 'carrier_pigeon'.*install.*raw", image_transport='carrier_pigeon')
+        self.check_refused("~color_transport is 'carrier_pigeon'.*install.*raw", color_transport='carrier_pigeon')
+        self.check_refused('color_transport is compressedDepth.*raw or compressed', color_transport='compressedDepth')
+
+    def test_colour_has_a_transport_of_its_own(self):
+        camera, mapper = CameraTopics(), Mapper('packed')
+        self.start('packed', image_transport='compressedDepth')
+        mapper.wait_until_connected(camera.compressed, camera.color, camera.info, camera.tf)
+        message = compressed_depth(camera.camera.depth(0), None)
+        report = mapper.report(camera.send(0, message=message, color=camera.camera.color()))
+        self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        self.assertTrue(has_color(mapper.surfels()).any())
 
     def test_unknown_parameters_are_warned_of(self):
         process = self.start('warned', z_maximum=4.0, decimatoin=2)

@@ -3,6 +3,7 @@
 #include <frontier_surfels/FrameReport.h>
 #include <image_transport/exception.h>
 
+#include <set>
 #include <utility>
 
 namespace frontier_surfels {
@@ -11,6 +12,15 @@ namespace {
 constexpr int kQueue = 10;  // messages; callbacks return at once, so that it is seldom used
 constexpr auto kPoll = std::chrono::milliseconds(1);
 constexpr auto kColorWait = std::chrono::milliseconds(30);  // a camera's period: mapping without colour is better than waiting longer
+
+/// For people.
+std::string installed_transports(const image_transport::ImageTransport& transport) {
+  std::set<std::string> names = {"raw", "compressed", "compressedDepth"};
+  for (const std::string& name : transport.getLoadableTransports()) names.insert(name.substr(name.find('/') + 1));
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
+}
 
 }  // namespace
 
@@ -30,35 +40,41 @@ CameraInput::~CameraInput() {
   if (thread_.joinable()) thread_.join();
 }
 
-void CameraInput::start(const ros::NodeHandle& nh) {
+void CameraInput::start(const ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
   ros::NodeHandle handle(nh);
   info_topic_ = handle.resolveName(topics_.info);
   transport_ = std::make_unique<image_transport::ImageTransport>(handle);
   thread_ = std::thread([this] { run(); });
   info_ = handle.subscribe(topics_.info, kQueue, &CameraInput::add_info, this);
-  if (config_.use_color)
-    color_ = subscribe(handle, topics_.color, config_.color_transport, [this](const auto& image) { add_color(image); });
-  depth_ = subscribe(handle, topics_.depth, config_.image_transport, [this](const auto& image) { add_depth({image, Clock::now()}); });
+  if (config_.use_color) {
+    const Transport transport = {config_.color_transport, pnh, "color_transport"};
+    color_ = subscribe(handle, topics_.color, transport, [this](const auto& image) { add_color(image); });
+  }
+  const Transport transport = {config_.image_transport, pnh, "image_transport"};
+  depth_ = subscribe(handle, topics_.depth, transport, [this](const auto& image) { add_depth({image, Clock::now()}); });
 }
 
 /// The two compressed transports that depth cameras use are decoded here, not by image_transport: their plugins need not be installed, and
 /// the map is the same as that of a bag.
-CameraInput::Subscription CameraInput::subscribe(ros::NodeHandle& nh, const std::string& topic, const std::string& transport,
+CameraInput::Subscription CameraInput::subscribe(ros::NodeHandle& nh, const std::string& topic, const Transport& transport,
                                                  const OnImage& on_image) {
   Subscription subscription;
-  if (transport == "compressedDepth" || transport == "compressed") {
+  if (transport.name == "compressedDepth" || transport.name == "compressed") {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> callback = [on_image](const auto& image) {
       on_image({nullptr, image});
     };
-    subscription.compressed = nh.subscribe<sensor_msgs::CompressedImage>(nh.resolveName(topic) + "/" + transport, kQueue, callback);
+    subscription.compressed = nh.subscribe<sensor_msgs::CompressedImage>(nh.resolveName(topic) + "/" + transport.name, kQueue, callback);
     return subscription;
   }
   const boost::function<void(const sensor_msgs::ImageConstPtr&)> callback = [on_image](const auto& image) { on_image({image, nullptr}); };
+  // The hints read the parameter once more. Without its name, that of the depth images would also choose the transport of the colour
+  // images.
+  const image_transport::TransportHints hints(transport.name, ros::TransportHints(), transport.pnh, transport.parameter);
   try {
-    subscription.transported = transport_->subscribe(topic, kQueue, callback, ros::VoidPtr(), image_transport::TransportHints(transport));
-  } catch (const image_transport::Exception& error) {
-    throw Error("The image transport '" + transport + "' cannot be used for " + topic + " (" + error.what() +
-                "): install its plugin, or choose raw.");
+    subscription.transported = transport_->subscribe(topic, kQueue, callback, ros::VoidPtr(), hints);
+  } catch (const image_transport::Exception&) {
+    throw Error("~" + transport.parameter + " is '" + transport.name + "', for which there is no plugin: install it, or choose one of " +
+                installed_transports(*transport_) + ".");
   }
   return subscription;
 }

@@ -44,8 +44,9 @@ class CameraInput {
   CameraInput(const NodeConfig& config, CameraTopics topics, FramePoses& poses, Listener listener);
   ~CameraInput();
 
-  /// Subscribes the topics and begins to look for what images lack. To be called once. @throws Error if an image transport is not installed
-  void start(const ros::NodeHandle& nh);
+  /// Subscribes the topics and begins to look for what images lack. To be called once. @param pnh  where the parameters were read
+  /// @throws Error if an image transport is not installed
+  void start(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
 
   // What arrives. From any thread.
   void add_depth(const DepthArrival& arrival);
@@ -76,9 +77,14 @@ class CameraInput {
     image_transport::Subscriber transported;
     ros::Subscriber compressed;
   };
+  struct Transport {
+    std::string name;
+    ros::NodeHandle pnh;
+    std::string parameter;  ///< of pnh, that has the name
+  };
   using OnImage = std::function<void(const messages::ImageMessage&)>;
 
-  Subscription subscribe(ros::NodeHandle& nh, const std::string& topic, const std::string& transport, const OnImage& on_image);
+  Subscription subscribe(ros::NodeHandle& nh, const std::string& topic, const Transport& transport, const OnImage& on_image);
   void run();
   void tell(const std::vector<DroppedImage>& dropped) const;
 
