@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The node as a process: how it starts, what it refuses, how it ends."""
+import re
 import signal
 import subprocess
 import threading
@@ -10,9 +11,10 @@ import rospy
 from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
 
 from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
-from synthetic_camera import Camera, compressed_depth
+from synthetic_camera import Camera, compressed_depth, pose, transform
 
 REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info',
               'color/image:=camera/color/image']
@@ -57,6 +59,27 @@ class Processes(unittest.TestCase):
         report = mapper.report(camera.send(0, message=message, color=camera.camera.color()))
         self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
         self.assertTrue(has_color(mapper.surfels()).any())
+
+    def test_transforms_that_cannot_be_used(self):
+        """They end nothing, and one line is printed about them, not two by tf for each."""
+        camera, mapper = CameraTopics(), Mapper('unmoved')
+        process = self.start('unmoved')
+        mapper.wait_until_connected(*camera.raw())
+        last = rospy.Time(4294967295, 999999999)
+        for step in range(3):
+            stamp = rospy.Time.now()
+            for parent, child, time_of in (('map', camera.frame, last), ('map', '', stamp), ('', camera.frame, stamp), ('map', 'map', stamp)):
+                for _ in range(5):
+                    camera.tf.publish(TFMessage([transform(pose(step), parent, child, time_of)]))
+            report = mapper.report(camera.send(step))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        report = mapper.report(camera.send(3, stamp=last, send_pose=False))
+        self.assertEqual(report.result, FrameReport.DROPPED_NO_POSE, report.reason)
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        self.assertEqual(len(re.findall('A transform.*is not used.*stamp of 4294967295.*test_processes', output)), 1, output)
+        self.assertLess(len(output.splitlines()), 10, output)
 
     def test_unknown_parameters_are_warned_of(self):
         process = self.start('warned', z_maximum=4.0, decimatoin=2)

@@ -113,6 +113,9 @@ std::vector<DroppedImage> CameraInput::follow_time(const std_msgs::Header& heade
   constexpr double kLate = 1;  // [s]; no delay of transport is longer
   if (header.stamp.isZero())
     throw DroppedFrame(FrameReport::DROPPED_NO_POSE, "The image's stamp is 0, which is no time: its driver must set it.");
+  if (messages::strip_slash(header.frame_id).empty())
+    throw DroppedFrame(FrameReport::DROPPED_NO_POSE,
+                       "The image's frame_id is empty: its driver must set it to the camera's optical frame.");
   const ros::Time now = ros::Time::now();
   clock_went_back_ = clock_went_back_ || now < last_now_;
   last_now_ = now;
