@@ -275,7 +275,7 @@ void Mapper::reset() {
 
 Statistics Mapper::statistics() const {
   Statistics statistics;
-  for (const Surfel& surfel : whole_map()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
+  for (const Surfel& surfel : surfels()) ++(surfel.label == Label::kOccupied ? statistics.occupied : statistics.frontier);
   statistics.surfels = statistics.occupied + statistics.frontier;
   statistics.map_bytes = impl_->map.bytes();
   statistics.device_bytes = impl_->device_bytes();

@@ -63,7 +63,7 @@ class Mapper {
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
   void reset();
 
-  /// Counts the surfels of whole_map(). @throws FileError
+  /// Counts the surfels of surfels().
   Statistics statistics() const;
   std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
   std::uint64_t sequence() const;

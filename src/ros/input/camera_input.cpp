@@ -2,6 +2,9 @@
 
 #include <frontier_surfels/FrameReport.h>
 #include <image_transport/exception.h>
+#include <ros/console.h>
+#include <ros/master.h>
+#include <ros/this_node.h>
 
 #include <set>
 #include <utility>
@@ -12,6 +15,25 @@ namespace {
 constexpr int kQueue = 10;  // messages; callbacks return at once, so that it is seldom used
 constexpr auto kPoll = std::chrono::milliseconds(1);
 constexpr auto kColorWait = std::chrono::milliseconds(30);  // a camera's period: mapping without colour is better than waiting longer
+
+/// The topics of images, for people.
+std::string published_images() {
+  using XmlRpc::XmlRpcValue;
+  XmlRpcValue request, response, topics;
+  request[0] = ros::this_node::getName();
+  request[1] = "";
+  std::set<std::string> names;
+  if (ros::master::execute("getPublishedTopics", request, response, topics, false)) {
+    for (int i = 0; i < topics.size(); ++i) {
+      const std::string type = topics[i][1];
+      if (type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage") names.insert(topics[i][0]);
+    }
+  }
+  if (names.empty()) return "No node publishes images.";
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return "The topics of images are: " + all + ".";
+}
 
 /// For people.
 std::string installed_transports(const image_transport::ImageTransport& transport) {
@@ -29,7 +51,8 @@ CameraInput::CameraInput(const NodeConfig& config, CameraTopics topics, FramePos
       topics_(std::move(topics)),
       poses_(poses),
       listener_(std::move(listener)),
-      inbox_(std::chrono::duration<double>(config.tf_timeout)) {}
+      inbox_(std::chrono::duration<double>(config.tf_timeout)),
+      remarks_(config.mapper, [](const std::string& remark) { ROS_WARN("%s", remark.c_str()); }) {}
 
 CameraInput::~CameraInput() {
   {
@@ -83,6 +106,7 @@ void CameraInput::add_depth(const DepthArrival& arrival) {
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    depth_came_ = true;
     try {
       if (paused_) throw DroppedFrame(FrameReport::DROPPED_PAUSED, "Mapping is paused: call ~pause with false to go on.");
       check_depth(arrival.image);
@@ -104,6 +128,7 @@ void CameraInput::add_info(const sensor_msgs::CameraInfoConstPtr& info) {
 
 void CameraInput::add_color(const messages::ImageMessage& image) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  color_came_ = true;
   colors_.add(image, Clock::now());
 }
 
@@ -192,6 +217,21 @@ std::optional<CompleteImage> CameraInput::take() {
   return inbox_.is_ready() ? std::make_optional(inbox_.take()) : std::nullopt;
 }
 
+std::vector<std::string> CameraInput::missing() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!depth_came_) {
+    const std::string topic = depth_.topic(), none = "No depth image has come on " + topic;
+    if (depth_.publishers() == 0)
+      return {none + ", which no node publishes: remap " + topics_.depth +
+              " to the topic of the depth camera, and check ~image_transport. " + published_images()};
+    return {none + ", although a node publishes it: check with `rostopic hz " + topic +
+            "` that it sends images, and that the machines reach each other (ROS_IP, ROS_HOSTNAME)."};
+  }
+  if (!config_.use_color || color_came_) return {};
+  return {"No colour image has come on " + color_.topic() + ", so that the map gets no colour: remap " + topics_.color +
+          " to images that are registered to depth and check ~color_transport, or set ~use_color to false."};
+}
+
 void CameraInput::pause(bool paused) {
   std::vector<DroppedImage> dropped;
   {
@@ -214,6 +254,7 @@ void CameraInput::reset() {
     clock_went_back_ = false;
   }
   last_mapped_ = ros::Time();
+  remarks_.forget();
   tell(dropped);
 }
 
