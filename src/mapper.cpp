@@ -235,14 +235,15 @@ Changes Mapper::changes(std::uint64_t since) const {
   return changes;
 }
 
-void Mapper::save(const std::string& path) const {
+std::vector<Surfel> Mapper::whole_map() const {
   std::vector<Surfel> all = surfels();
-  if (impl_->archive) {
-    const std::vector<Surfel> stored = impl_->archive->stored();
-    all.insert(all.end(), stored.begin(), stored.end());
-  }
-  write_map(path, all);
+  if (!impl_->archive) return all;
+  const std::vector<Surfel> stored = impl_->archive->stored();
+  all.insert(all.end(), stored.begin(), stored.end());
+  return all;
 }
+
+void Mapper::save(const std::string& path) const { write_map(path, whole_map()); }
 
 void Mapper::load(const std::string& path) {
   const std::vector<Surfel> surfels = read_map(path);

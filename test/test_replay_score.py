@@ -16,6 +16,7 @@ import unittest
 
 import matplotlib.image
 import numpy
+from PIL import Image as Picture
 
 PROGRAM, MAKE_SYNTHETIC = None, None
 FRAMES = 16
@@ -242,7 +243,37 @@ class SyntheticRoom(unittest.TestCase):
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
 
 
-class Picture(unittest.TestCase):
+class MapFolder(unittest.TestCase):
+    """A recording of two walls, so far from each other that only the second one is in memory at the end."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.recording, self.report, self.kept = (os.path.join(self.folder.name, name) for name in ('walls', 'report', 'kept'))
+        os.makedirs(os.path.join(self.recording, 'depth'))
+        for frame in range(2):
+            Picture.fromarray(numpy.full((60, 80), 1500, dtype=numpy.uint16)).save(os.path.join(self.recording, 'depth', f'{frame:04}.png'))
+        for name, text in (('camera.txt', '70 70 39.5 29.5 80 60\n'), ('poses.txt', '0 0 0 0 0 0 0 1\n1 200 0 0 0 0 0 1\n')):
+            with open(os.path.join(self.recording, name), 'w', encoding='utf-8') as file:
+                file.write(text)
+
+    def replay(self):
+        return run(self.recording, '--report', self.report, '--set', f'map_folder={self.kept}', '--set', 'eviction_radius=10',
+                   '--set', 'decimation=1', '--no-exact')
+
+    def test_the_report_has_the_whole_map(self):
+        result = self.replay()
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        surfels = read_surfels(self.report)
+        self.assertGreater(min((surfels['x'] < 100).sum(), (surfels['x'] > 100).sum()), 1000)
+        self.assertEqual(read_json(self.report)['surfels']['total'], len(surfels))
+        with self.subTest('the map of another run is not scored as that of this recording'):
+            again = self.replay()
+            self.assertEqual(again.returncode, FAILED, again.stdout)
+            self.assertRegex(again.stderr, 'kept.*already has a map.*another')
+
+
+class ReadmePicture(unittest.TestCase):
     """README's picture."""
 
     def blue_share(self, panel):

@@ -253,6 +253,12 @@ TEST(Sweep, RefusesWhatItCannotDo) {
   }
 }
 
+TEST(Sweep, RefusesToBeginWithAnotherValuesMap) {
+  Config base;
+  base.map_folder = "kept";
+  EXPECT_THROW(parse_sweep("th_d=0.1:0.2:2", base), Error);
+}
+
 TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   const Yardsticks yardsticks(Config(), 0, false);
   Config config;

@@ -84,9 +84,18 @@ BagLiveReplay::BagLiveReplay(const Recording& recording, const LiveOptions& opti
   if (!std::filesystem::exists(recording.path)) throw Error("There is no bag '" + recording.path + "'.");
   init_ros(options.ros_arguments);
   mapper_ = std::make_unique<RunningMapper>(options.mapper, stop);
+  refuse_map_folder();
   open_bag();
   player_ = std::make_unique<BagPlayer>(*source_, *mapper_);
   tell_what_is_not_heard();
+}
+
+/// The map is taken from topics, which have only what is in memory, and it is reset before, which would empty the folder.
+void BagLiveReplay::refuse_map_folder() const {
+  const std::string& folder = mapper_->config().map_folder;
+  if (folder.empty()) return;
+  throw Error("The mapper " + mapper_->name() + " keeps its map in the folder '" + folder +
+              "', which a replay would empty: start a mapper without map_folder, or leave --live out.");
 }
 
 /// Opens the bag with the world frame of the mapper, so that both use the same poses.

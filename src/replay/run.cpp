@@ -1,5 +1,6 @@
 #include "replay/run.hpp"
 
+#include <algorithm>
 #include <fstream>
 
 #include "replay/progress.hpp"
@@ -63,14 +64,22 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
 Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
   const auto source = open_source(recording.path, recording.options);
   Mapper mapper(config);
+  if (!config.map_folder.empty() && !mapper.whole_map().empty()) {
+    throw Error("The map folder '" + config.map_folder +
+                "' already has a map, which would be scored as if it were made of this recording: delete the folder, or choose another.");
+  }
   const auto measure = [yardsticks](const DepthFrame& view, FrameRecord& record) {
     if (yardsticks != nullptr) record.octomap = yardsticks->add(view);
   };
   Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty()) throw nothing_usable(recording, run.skipped);
 
-  run.surfels = mapper.surfels();
+  run.surfels = mapper.whole_map();
   run.statistics = mapper.statistics();
+  run.statistics.surfels = run.surfels.size();  // on disk, too
+  run.statistics.occupied = static_cast<std::size_t>(
+      std::count_if(run.surfels.begin(), run.surfels.end(), [](const Surfel& surfel) { return surfel.label == Label::kOccupied; }));
+  run.statistics.frontier = run.statistics.surfels - run.statistics.occupied;
   run.peak_rss_mb = peak_rss_mb();
   return run;
 }

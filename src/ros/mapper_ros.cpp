@@ -12,11 +12,13 @@
 #include <std_srvs/Trigger.h>
 
 #include <atomic>
+#include <filesystem>
 #include <future>
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "ros/input/camera_input.hpp"
+#include "ros/input/input_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
@@ -55,6 +57,7 @@ class MapperRos::Impl {
 
  private:
   void report_dropped(const DroppedImage& image);
+  void report_missing(const std::string& reason);
 
   // On the mapping thread
   bool map_next();
@@ -88,6 +91,7 @@ class MapperRos::Impl {
   std::unique_ptr<Worker> worker_;
   std::vector<std::unique_ptr<CameraInput>> cameras_;
   std::unique_ptr<MapperDiagnostics> diagnostics_;
+  std::unique_ptr<InputWatch> watch_;
   ros::CallbackQueue service_queue_;  // its own, because services wait for the current frame and must not hold up the images
   ros::NodeHandle service_nh_;
   std::vector<ros::ServiceServer> services_;
@@ -103,7 +107,8 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
   poses_.start(nh_);
-  for (const auto& camera : cameras_) camera->start(nh_);
+  for (const auto& camera : cameras_) camera->start(nh_, pnh_);
+  watch_ = std::make_unique<InputWatch>(nh_, cameras_, [this](const std::string& reason) { report_missing(reason); });
   worker_->start();
   start_services();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
@@ -121,7 +126,8 @@ void MapperRos::Impl::start_services() {
 }
 
 MapperRos::Impl::~Impl() {
-  worker_->stop();  // first, because it asks the cameras
+  watch_.reset();
+  worker_->stop();  // before the cameras, because it asks them
   cameras_.clear();
   service_spinner_->stop();
   publisher_.reset();
@@ -137,6 +143,16 @@ void MapperRos::Impl::report_dropped(const DroppedImage& image) {
   message.latency_ms = message.wait_ms = ms_since(image.arrival.time);
   reports_.publish(message);
   diagnostics_->add(message);
+}
+
+void MapperRos::Impl::report_missing(const std::string& reason) {
+  FrameReport message;
+  message.result = FrameReport::NO_INPUT;
+  message.reason = reason;
+  message.surfels = surfels_;
+  message.sequence = sequence_;
+  reports_.publish(message);
+  ROS_WARN("%s", reason.c_str());
 }
 
 /// Maps the earliest image that is ready, of whichever camera. @return false if there is none
@@ -186,6 +202,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   FrameReport message = messages::to_message(report);
   message.header = header;
   message.result = FrameReport::INTEGRATED;
+  message.reason = camera.remarks().on(frame, *image.info, Clock::now());
   message.wait_ms = wait_ms;
   message.latency_ms = ms_since(image.arrival.time);
   return message;
@@ -255,7 +272,10 @@ bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBo
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
-    const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
+    const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
+    if (surfels.empty() && std::filesystem::exists(request.path))
+      throw FileError("The map is empty, and was not written over the existing file " + request.path +
+                      ": delete the file, or choose another path.");
     write_map(request.path, surfels);  // on this thread, so that mapping goes on
     return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
   });

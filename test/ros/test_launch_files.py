@@ -101,6 +101,17 @@ class LaunchFiles(unittest.TestCase):
         self.assertGreater(summary['surfels']['total'], 1000)
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
 
+    def test_live_replay_leaves_map_folders_alone(self):
+        kept = os.path.join(self.folder, 'kept')
+        mapper = subprocess.Popen([program('mapper_node'), '__name:=keeping', '_map_folder:=' + kept])
+        self.addCleanup(mapper.wait)
+        self.addCleanup(mapper.kill)
+        report = os.path.join(self.folder, 'no report')
+        result = subprocess.run([program('replay_score'), self.bag, '--live', '--mapper', 'keeping', '--report', report], capture_output=True,
+                                text=True, timeout=60)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertRegex(result.stderr, 'keeping.*' + kept + '.*without map_folder')
+
 
 if __name__ == '__main__':
     run('test_launch_files', LaunchFiles)

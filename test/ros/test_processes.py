@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """The node as a process: how it starts, what it refuses, how it ends."""
+import re
 import signal
 import subprocess
 import threading
@@ -10,11 +11,13 @@ import rospy
 from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
 
-from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
-from synthetic_camera import Camera
+from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
+from synthetic_camera import Camera, compressed_depth, pose, transform
 
-REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info']
+REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info',
+              'color/image:=camera/color/image']
 
 
 class Processes(unittest.TestCase):
@@ -44,7 +47,39 @@ class Processes(unittest.TestCase):
         self.check_refused('no-such-platform', platform='no-such-platform')
 
     def test_no_such_transport(self):
-        self.check_refused('carrier_pigeon.*install', image_transport='carrier_pigeon')
+        self.check_refused("~image_transport is 'carrier_pigeon'.*install.*raw", image_transport='carrier_pigeon')
+        self.check_refused("~color_transport is 'carrier_pigeon'.*install.*raw", color_transport='carrier_pigeon')
+        self.check_refused('color_transport is compressedDepth.*raw or compressed', color_transport='compressedDepth')
+
+    def test_colour_has_a_transport_of_its_own(self):
+        camera, mapper = CameraTopics(), Mapper('packed')
+        self.start('packed', image_transport='compressedDepth')
+        mapper.wait_until_connected(camera.compressed, camera.color, camera.info, camera.tf)
+        message = compressed_depth(camera.camera.depth(0), None)
+        report = mapper.report(camera.send(0, message=message, color=camera.camera.color()))
+        self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        self.assertTrue(has_color(mapper.surfels()).any())
+
+    def test_transforms_that_cannot_be_used(self):
+        """They end nothing, and one line is printed about them, not two by tf for each."""
+        camera, mapper = CameraTopics(), Mapper('unmoved')
+        process = self.start('unmoved')
+        mapper.wait_until_connected(*camera.raw())
+        last = rospy.Time(4294967295, 999999999)
+        for step in range(3):
+            stamp = rospy.Time.now()
+            for parent, child, time_of in (('map', camera.frame, last), ('map', '', stamp), ('', camera.frame, stamp), ('map', 'map', stamp)):
+                for _ in range(5):
+                    camera.tf.publish(TFMessage([transform(pose(step), parent, child, time_of)]))
+            report = mapper.report(camera.send(step))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        report = mapper.report(camera.send(3, stamp=last, send_pose=False))
+        self.assertEqual(report.result, FrameReport.DROPPED_NO_POSE, report.reason)
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        self.assertEqual(len(re.findall('A transform.*is not used.*stamp of 4294967295.*test_processes', output)), 1, output)
+        self.assertLess(len(output.splitlines()), 10, output)
 
     def test_unknown_parameters_are_warned_of(self):
         process = self.start('warned', z_maximum=4.0, decimatoin=2)

@@ -35,11 +35,13 @@ struct NodeConfig {
 template <typename ConfigT, typename Visitor>
 void for_each_node_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"world_frame", "", "tf frame of the map"}, config.world_frame);
-  visit(FieldInfo{"image_transport", "", "transport of the depth images: raw, compressedDepth, or any other that is installed"},
+  visit(FieldInfo{"image_transport", "",
+                  "transport of the depth images: raw, compressedDepth, or another one that is installed; else the node does not start"},
         config.image_transport);
   visit(FieldInfo{"use_color", "", "whether occupied surfels take their colour from color/image, which must be registered to depth"},
         config.use_color);
-  visit(FieldInfo{"color_transport", "", "transport of the colour images: raw, compressed, or any other that is installed"},
+  visit(FieldInfo{"color_transport", "",
+                  "transport of the colour images: raw, compressed, or another one that is installed; else the node does not start"},
         config.color_transport);
   visit(FieldInfo{"tf_timeout", "s", "how long an image waits for its pose and its camera_info", 0, 10}, config.tf_timeout);
   visit(FieldInfo{"on_time_jump", "", "what becomes of the map when time jumps back, as when a bag loops: keep or reset"},
