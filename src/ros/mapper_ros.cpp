@@ -61,6 +61,7 @@ class MapperRos::Impl {
   void map(CameraInput& camera, const CompleteImage& image);
   FrameReport integrate(CameraInput& camera, const CompleteImage& image);
   void start_again(const ros::Time& from, const ros::Time& to);
+  void show_other_map();
   void publish_changes();
 
   // Services
@@ -102,6 +103,8 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
+  diagnostics_->set_map(mapper_.statistics());
+  write_parameters(pnh_, config_);
   poses_.start(nh_);
   for (const auto& camera : cameras_) camera->start(nh_);
   worker_->start();
@@ -160,7 +163,11 @@ void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
     const FrameReport message = integrate(camera, image);
     reports_.publish(message);
     diagnostics_->add(message);
-    diagnostics_->set_memory(message.map_bytes, message.device_bytes);
+    Statistics map;
+    map.surfels = message.surfels;
+    map.map_bytes = message.map_bytes;
+    map.device_bytes = message.device_bytes;
+    diagnostics_->set_map(map);
   } catch (const DroppedFrame& fault) {
     drop(fault.result, fault.what());
   } catch (const BadFrame& fault) {
@@ -200,6 +207,14 @@ void MapperRos::Impl::start_again(const ros::Time& from, const ros::Time& to) {
   for (const auto& camera : cameras_) camera->set_last_mapped(std::min(camera->last_mapped(), to));
 }
 
+/// The map has been replaced by another one, and not by a frame: it is told with the time of now.
+void MapperRos::Impl::show_other_map() {
+  surfels_ = static_cast<std::uint32_t>(mapper_.size());
+  sequence_ = mapper_.sequence();
+  state_.stamp = ros::Time::now();
+  diagnostics_->set_map(mapper_.statistics());
+}
+
 void MapperRos::Impl::publish_changes() {
   if (!publisher_->wants_changes()) return;
   const std::uint64_t since = publisher_->sequence();
@@ -236,8 +251,7 @@ bool MapperRos::Impl::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Resp
   return answer(response, [&] {
     worker_->run_job([&] {
       mapper_.reset();
-      surfels_ = 0;
-      sequence_ = mapper_.sequence();
+      show_other_map();
       for (const auto& camera : cameras_) camera->reset();
     });
     return std::string("The map is empty.");
@@ -265,8 +279,7 @@ bool MapperRos::Impl::load_map(MapFile::Request& request, MapFile::Response& res
   return answer(response, [&] {
     worker_->run_job([&] {
       mapper_.load(request.path);
-      surfels_ = static_cast<std::uint32_t>(mapper_.size());
-      sequence_ = mapper_.sequence();
+      show_other_map();
     });
     return std::to_string(surfels_) + " surfels were read from " + request.path + ".";
   });

@@ -1,15 +1,20 @@
 #!/usr/bin/python3
 """The node as a process: how it starts, what it refuses, how it ends."""
+import os
+import shutil
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
 
 import rospy
-from frontier_surfels.msg import FrameReport
+from diagnostic_msgs.msg import DiagnosticArray
+from frontier_surfels.msg import FrameReport, SurfelUpdate
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
 from synthetic_camera import Camera
@@ -54,6 +59,50 @@ class Processes(unittest.TestCase):
         self.assertEqual(process.returncode, 0, output)
         self.assertRegex(output, '~z_maximum')
         self.assertRegex(output, '~decimatoin.*decimation')
+
+    def test_parameters_in_force_are_on_the_parameter_server(self):
+        self.start('told', z_max=2.5)
+        Mapper('told').wait_until_connected()
+        parameters = rospy.get_param('told')
+        self.assertEqual((parameters['z_max'], parameters['z_min'], parameters['world_frame'], parameters['marker_limit']),
+                         (2.5, 0.5, 'map', 100000))
+        self.assertEqual((parameters['remove_buried'], parameters['map_folder']), (True, ''))
+
+    def test_a_loaded_map_is_shown_before_the_first_frame(self):
+        """/diagnostics counts it, and its clouds, markers and updates are stamped with now."""
+        camera, source = CameraTopics(), Mapper('source')
+        self.start('source')
+        source.wait_until_connected(*camera.raw())
+        surfels = source.report(camera.send(0)).surfels
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'map.ply')
+        self.assertTrue(source.save(path).success)
+        stamps, counted = {}, []
+        self.start('shown')
+        shown = Mapper('shown')
+        shown.wait_until_connected()
+        start = rospy.Time.now()
+        self.assertTrue(shown.load(path).success)
+
+        def see(topic, kind, stamp_of):
+            subscriber = rospy.Subscriber(topic, kind, lambda message: stamps.setdefault(topic, stamp_of(message)))
+            self.addCleanup(subscriber.unregister)
+
+        def read(array):
+            counted.extend(entry.value for status in array.status if status.name.startswith('shown') for entry in status.values
+                           if entry.key == 'surfels')
+
+        for topic in ('shown/surfels', 'shown/occupied', 'shown/frontier'):
+            see(topic, PointCloud2, lambda message: message.header.stamp)
+        see('shown/update', SurfelUpdate, lambda message: message.header.stamp)
+        see('shown/markers', MarkerArray, lambda message: message.markers[-1].header.stamp)
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, read)
+        self.addCleanup(subscriber.unregister)
+        wait_until(lambda: len(stamps) == 5, what='all topics')
+        for topic, stamp in stamps.items():
+            self.assertTrue(start <= stamp <= rospy.Time.now(), (topic, stamp.to_sec(), start.to_sec()))
+        wait_until(lambda: str(surfels) in counted, what='the surfels in /diagnostics')
 
     def check_ends(self, process):
         """The process ends on SIGINT, as roslaunch sends it."""

@@ -58,6 +58,9 @@ void for_each_node_field(ConfigT& config, Visitor&& visit) {
 /// @throws Error with every fault: wrong types, values out of range
 NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>* warnings);
 
+/// Sets every parameter in the namespace of `pnh` to the value that is in force, defaults included, so that `rosparam get` shows it.
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config);
+
 /// Reads the parameters of the mapper in a running node of this name. @throws Error with every fault
 Config read_mapper_config(const std::string& node);
 
