@@ -16,6 +16,7 @@
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
@@ -54,6 +55,7 @@ class MapperRos::Impl {
   ~Impl();
 
  private:
+  void tell_parameters();
   void report_dropped(const DroppedImage& image);
 
   // On the mapping thread
@@ -104,12 +106,20 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
   diagnostics_->set_map(mapper_.statistics());
-  write_parameters(pnh_, config_);
+  tell_parameters();
   poses_.start(nh_);
   for (const auto& camera : cameras_) camera->start(nh_);
   worker_->start();
   start_services();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
+}
+
+void MapperRos::Impl::tell_parameters() {
+  NodeConfig in_force = config_;
+  in_force.mapper = mapper_.config();
+  write_parameters(pnh_, in_force);
+  const std::string& folder = in_force.mapper.map_folder;
+  if (!folder.empty()) ROS_INFO("The map is kept in the folder %s.", folder.c_str());
 }
 
 void MapperRos::Impl::start_services() {
@@ -270,18 +280,24 @@ bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& res
   return answer(response, [&] {
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
     const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
-    write_map(request.path, surfels);  // on this thread, so that mapping goes on
-    return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
+    const std::string path = absolute_path(request.path);
+    write_map(path, surfels);  // on this thread, so that mapping goes on
+    const std::string done = std::to_string(surfels.size()) + " surfels were written to " + path + ".";
+    ROS_INFO("%s", done.c_str());
+    return done;
   });
 }
 
 bool MapperRos::Impl::load_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
+    const std::string path = absolute_path(request.path);
     worker_->run_job([&] {
-      mapper_.load(request.path);
+      mapper_.load(path);
       show_other_map();
     });
-    return std::to_string(surfels_) + " surfels were read from " + request.path + ".";
+    const std::string done = std::to_string(surfels_) + " surfels were read from " + path + ".";
+    ROS_INFO("%s", done.c_str());
+    return done;
   });
 }
 

@@ -23,12 +23,13 @@ REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera
 
 
 class Processes(unittest.TestCase):
-    def start(self, name, **parameters):
+    def start(self, name, environment=None, **parameters):
         """Starts a mapper as a process of this test."""
         program = find_node('frontier_surfels', 'mapper_node')[0]
         arguments = [f'__name:={name}', *REMAPPINGS, *(f'_{key}:={value}' for key, value in parameters.items())]
         self.addCleanup(lambda: rospy.has_param(name) and rospy.delete_param(name))
-        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                   env={**os.environ, **(environment or {})})
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -67,6 +68,17 @@ class Processes(unittest.TestCase):
         self.assertEqual((parameters['z_max'], parameters['z_min'], parameters['world_frame'], parameters['marker_limit']),
                          (2.5, 0.5, 'map', 100000))
         self.assertEqual((parameters['remove_buried'], parameters['map_folder']), (True, ''))
+
+    def test_the_map_folder_may_begin_with_a_tilde(self):
+        home = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, home)
+        process = self.start('homely', {'HOME': home}, map_folder='~/map')
+        Mapper('homely').wait_until_connected()
+        self.assertEqual(rospy.get_param('homely/map_folder'), os.path.join(home, 'map'))
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertIn(os.path.join(home, 'map') + '.', output)
+        self.assertIn('map.sqlite', os.listdir(os.path.join(home, 'map')))
 
     def test_a_loaded_map_is_shown_before_the_first_frame(self):
         """/diagnostics counts it, and its clouds, markers and updates are stamped with now."""
