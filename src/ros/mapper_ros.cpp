@@ -11,6 +11,7 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 
+#include <algorithm>
 #include <atomic>
 #include <future>
 
@@ -76,6 +77,7 @@ class MapperRos::Impl {
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool save_map(MapFile::Request& request, MapFile::Response& response);
   bool load_map(MapFile::Request& request, MapFile::Response& response);
+  std::uint32_t take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const;
   bool get_surfels(GetSurfels::Request& request, GetSurfels::Response& response);
 
   ros::NodeHandle nh_, pnh_;
@@ -301,17 +303,30 @@ bool MapperRos::Impl::load_map(MapFile::Request& request, MapFile::Response& res
   });
 }
 
+/// Takes the surfels from first_id on, and of these at most `most` or as many as go into a message. @return next_id of the answer
+/// @throws Error if `most` is 0 and they do not go into a message
+std::uint32_t MapperRos::Impl::take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const {
+  const auto before = [](const Surfel& surfel, std::uint32_t id) { return surfel.id < id; };
+  surfels.erase(surfels.begin(), std::lower_bound(surfels.begin(), surfels.end(), first_id, before));
+  const std::size_t limit = static_cast<std::size_t>(config_.message_limit);
+  if (most == 0 || surfels.size() <= std::min(most, limit)) return 0;  // to_cloud() refuses too many
+  const std::uint32_t next_id = surfels[std::min(most, limit)].id;
+  surfels.resize(std::min(most, limit));
+  return next_id;
+}
+
+/// The response has no field for an error. What is thrown becomes the error that the caller of the service gets.
 bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Response& response) {
   const Eigen::AlignedBox3f box(to_vector(request.box_min), to_vector(request.box_max));
   try {
-    const auto surfels = worker_->run_job([&] {
+    auto surfels = worker_->run_job([&] {
       response.sequence = mapper_.sequence();
       return box.min() == box.max() ? mapper_.surfels() : mapper_.surfels(box);
     });
-    response.surfels = messages::to_cloud(surfels, config_.confident_label());
-  } catch (const std::exception& fault) {  // the response has no field for it
-    ROS_WARN("~get_surfels cannot be answered: %s", fault.what());
-    return false;
+    response.next_id = take_part(surfels, request.first_id, request.most);
+    response.surfels = messages::to_cloud(surfels, config_.confident_label(), static_cast<std::size_t>(config_.message_limit));
+  } catch (const std::future_error&) {
+    return false;  // the mapper is shutting down
   }
   response.surfels.header.frame_id = config_.world_frame;
   response.surfels.header.stamp = ros::Time::now();

@@ -91,9 +91,9 @@ class LaunchFiles(unittest.TestCase):
         home, tilde = self.in_home()
         shutil.copy(self.bag, os.path.join(home, 'room.bag'))
         with open(os.path.join(home, 'my.yaml'), 'w', encoding='utf-8') as file:
-            file.write('recent_views: 3\n')
+            file.write('recent_views: 3\nmessage_limit: 1000\n')  # the map of replay.launch then comes in parts
         self.assertEqual(self.parameters('mapper.launch', f'config:={tilde}/my.yaml')['/mapper/recent_views'], 3)
-        result = self.launch('replay.launch', f'report:={tilde}/report', 'options:=--octomap-resolution 0 --no-exact',
+        result = self.launch('replay.launch', f'report:={tilde}/report', f'config:={tilde}/my.yaml', 'options:=--octomap-resolution 0 --no-exact',
                              bag=f'{tilde}/room.bag')
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         self.assertTrue(os.path.exists(os.path.join(home, 'report', 'report.html')))
