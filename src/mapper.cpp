@@ -9,6 +9,7 @@
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "stages/candidates.hpp"
@@ -32,7 +33,9 @@ Config checked(const Config& config) {
   std::string all;
   for (const auto& problem : problems) all += (all.empty() ? "" : "\n") + problem;
   if (!all.empty()) throw Error(all);
-  return config;
+  Config checked = config;
+  checked.map_folder = absolute_path(config.map_folder);
+  return checked;
 }
 
 /// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.

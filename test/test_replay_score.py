@@ -90,6 +90,28 @@ class Usage(unittest.TestCase):
             with self.subTest(arguments=arguments):
                 self.check_refused(FAILED, sentence, arguments=arguments)
 
+    def test_names_that_are_too_long(self):
+        name = 300 * 'n'
+        for arguments in ([name, '--report', self.folder.name], [self.folder.name, '--report', self.folder.name, '--config', name]):
+            self.check_refused(1, name, arguments=arguments)
+        result = subprocess.run([MAKE_SYNTHETIC, name], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, '^[^\\n]*' + name + r'[^\n]*choose another folder\.\n$')
+
+    def test_a_tilde_that_no_shell_has_expanded_is_the_home_folder(self):
+        environment = {**os.environ, 'HOME': self.folder.name}
+        made = subprocess.run([MAKE_SYNTHETIC, "~/it's a room", '--frames', '2', '--size', '160x120'], capture_output=True, text=True,
+                              timeout=60, env=environment)
+        room = os.path.join(self.folder.name, "it's a room")
+        self.assertEqual((made.stdout, made.stderr), (f'2 frames are in {room}.\n', ''))
+        with open(os.path.join(self.folder.name, 'config.yaml'), 'w', encoding='utf-8') as file:
+            file.write('recent_views: 3\n')
+        result = run("~/it's a room", '--report=~/report', '--config=~/config.yaml', '--octomap-resolution', 0, '--no-exact', env=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        summary = read_json(os.path.join(self.folder.name, 'report'))
+        self.assertEqual((summary['input']['path'], summary['config']['recent_views']), (room, 3))
+        self.assertIn(os.path.join(self.folder.name, 'report', 'report.html'), result.stdout)
+
     def test_help_and_parameters_need_nothing_else(self):
         usage = run('--help')
         self.assertEqual((usage.returncode, usage.stderr), (DONE, ''))

@@ -9,6 +9,7 @@
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "frontier_surfels/ply.hpp"
 #include "replay/live_replay.hpp"
 #include "replay/report_page.hpp"
@@ -140,6 +141,8 @@ Options parse(int argc, char** argv) {
   declare_options(app, options, raw);
   read_arguments(app, [&] {
     app.parse(arguments);
+    // With --report=~/x and in launch files no shell has expanded the `~`.
+    for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
     // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.

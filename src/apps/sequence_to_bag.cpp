@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "frontier_surfels/paths.hpp"
 #include "recordings/bag_writer.hpp"
 #include "recordings/frame_source.hpp"
 
@@ -37,6 +38,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   options.leading_slashes = !no_slashes;
+  for (std::string* path : {&folder, &output}) *path = frontier_surfels::absolute_path(*path);
 
   try {
     const auto source = replay::open_source(folder, source_options);

@@ -78,10 +78,11 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
 
 BagLiveReplay::BagLiveReplay(const Recording& recording, const LiveOptions& options, const std::function<bool()>& stop)
     : recording_(recording) {
-  if (std::filesystem::is_directory(recording.path)) {
+  std::error_code ignored;  // a name may be too long to be asked for
+  if (std::filesystem::is_directory(recording.path, ignored)) {
     throw Error("'" + recording.path + "' is a folder, but --live plays bags: make a bag of it with sequence_to_bag.");
   }
-  if (!std::filesystem::exists(recording.path)) throw Error("There is no bag '" + recording.path + "'.");
+  if (!std::filesystem::exists(recording.path, ignored)) throw Error("There is no bag '" + recording.path + "'.");
   init_ros(options.ros_arguments);
   mapper_ = std::make_unique<RunningMapper>(options.mapper, stop);
   refuse_map_folder();

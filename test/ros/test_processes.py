@@ -1,17 +1,22 @@
 #!/usr/bin/python3
 """The node as a process: how it starts, what it refuses, how it ends."""
+import os
 import re
+import shutil
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
 
 import rospy
-from frontier_surfels.msg import FrameReport
+from diagnostic_msgs.msg import DiagnosticArray
+from frontier_surfels.msg import FrameReport, SurfelUpdate
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
 from synthetic_camera import Camera, compressed_depth, pose, transform
@@ -21,12 +26,13 @@ REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera
 
 
 class Processes(unittest.TestCase):
-    def start(self, name, **parameters):
+    def start(self, name, environment=None, **parameters):
         """Starts a mapper as a process of this test."""
         program = find_node('frontier_surfels', 'mapper_node')[0]
         arguments = [f'__name:={name}', *REMAPPINGS, *(f'_{key}:={value}' for key, value in parameters.items())]
         self.addCleanup(lambda: rospy.has_param(name) and rospy.delete_param(name))
-        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                   env={**os.environ, **(environment or {})})
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -89,6 +95,61 @@ class Processes(unittest.TestCase):
         self.assertEqual(process.returncode, 0, output)
         self.assertRegex(output, '~z_maximum')
         self.assertRegex(output, '~decimatoin.*decimation')
+
+    def test_parameters_in_force_are_on_the_parameter_server(self):
+        self.start('told', z_max=2.5)
+        Mapper('told').wait_until_connected()
+        parameters = rospy.get_param('told')
+        self.assertEqual((parameters['z_max'], parameters['z_min'], parameters['world_frame'], parameters['marker_limit']),
+                         (2.5, 0.5, 'map', 100000))
+        self.assertEqual((parameters['remove_buried'], parameters['map_folder']), (True, ''))
+
+    def test_the_map_folder_may_begin_with_a_tilde(self):
+        home = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, home)
+        process = self.start('homely', {'HOME': home}, map_folder='~/map')
+        Mapper('homely').wait_until_connected()
+        self.assertEqual(rospy.get_param('homely/map_folder'), os.path.join(home, 'map'))
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertIn(os.path.join(home, 'map') + '.', output)
+        self.assertIn('map.sqlite', os.listdir(os.path.join(home, 'map')))
+
+    def test_a_loaded_map_is_shown_before_the_first_frame(self):
+        """/diagnostics counts it, and its clouds, markers and updates are stamped with now."""
+        camera, source = CameraTopics(), Mapper('source')
+        self.start('source')
+        source.wait_until_connected(*camera.raw())
+        surfels = source.report(camera.send(0)).surfels
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'map.ply')
+        self.assertTrue(source.save(path).success)
+        stamps, counted = {}, []
+        self.start('shown')
+        shown = Mapper('shown')
+        shown.wait_until_connected()
+        start = rospy.Time.now()
+        self.assertTrue(shown.load(path).success)
+
+        def see(topic, kind, stamp_of):
+            subscriber = rospy.Subscriber(topic, kind, lambda message: stamps.setdefault(topic, stamp_of(message)))
+            self.addCleanup(subscriber.unregister)
+
+        def read(array):
+            counted.extend(entry.value for status in array.status if status.name.startswith('shown') for entry in status.values
+                           if entry.key == 'surfels')
+
+        for topic in ('shown/surfels', 'shown/occupied', 'shown/frontier'):
+            see(topic, PointCloud2, lambda message: message.header.stamp)
+        see('shown/update', SurfelUpdate, lambda message: message.header.stamp)
+        see('shown/markers', MarkerArray, lambda message: message.markers[-1].header.stamp)
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, read)
+        self.addCleanup(subscriber.unregister)
+        wait_until(lambda: len(stamps) == 5, what='all topics')
+        for topic, stamp in stamps.items():
+            self.assertTrue(start <= stamp <= rospy.Time.now(), (topic, stamp.to_sec(), start.to_sec()))
+        wait_until(lambda: str(surfels) in counted, what='the surfels in /diagnostics')
 
     def check_ends(self, process):
         """The process ends on SIGINT, as roslaunch sends it."""

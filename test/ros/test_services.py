@@ -7,8 +7,10 @@ import shutil
 import signal
 import subprocess
 import tempfile
+import xmlrpc.client
 
 import numpy
+import rosgraph
 from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
 
@@ -104,6 +106,31 @@ class Services(MapperTest):
                 self.check_refused(self.mapper.save(path), name + "'", r'must end in \.ply or \.pcd')
                 self.check_refused(self.mapper.load(path), name + "'", r'must end in \.ply or \.pcd')
         self.assertEqual(sorted(os.listdir(self.folder)), ['map.pcd', 'map.ply'])
+
+    def test_answers_name_the_absolute_path(self):
+        """The node's current folder is not that of its caller, and no shell expands `~` for it."""
+        self.map_walk(1)
+        home = tempfile.mkdtemp(dir=os.path.expanduser('~'))
+        self.addCleanup(shutil.rmtree, home)
+        current = os.readlink(f'/proc/{self.mapper_process()}/cwd')
+        for given, path in ((os.path.join('~', os.path.basename(home), 'map.ply'), os.path.join(home, 'map.ply')),
+                            (os.path.relpath(self.path, current), self.path)):
+            with case(given):
+                for answer in (self.mapper.save(given), self.mapper.load(given)):
+                    self.check_succeeded(answer)
+                    self.assertIn(f' {path}.', answer.message)
+                self.assertTrue(os.path.exists(path))
+
+    def mapper_process(self):
+        """The number of the mapper's process."""
+        server = rosgraph.Master('/test_services').lookupNode('/mapper')
+        return xmlrpc.client.ServerProxy(server).getPid('/test_services')[2]
+
+    def test_names_that_are_too_long(self):
+        self.map_walk(1)
+        path = os.path.join(self.folder, 300 * 'n' + '.ply')
+        for answer in (self.mapper.save(path), self.mapper.load(path)):
+            self.check_refused(answer, '/n{300}.ply.*a shorter one')
 
     def test_save_where_nothing_can_be_written(self):
         self.map_walk(1)

@@ -127,6 +127,12 @@ NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>*
   return config;
 }
 
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config) {
+  const auto write = [&pnh](const FieldInfo& info, const auto& value) { pnh.setParam(info.name, value); };
+  for_each_field(config.mapper, write);
+  for_each_node_field(config, write);
+}
+
 Config read_mapper_config(const std::string& node) {
   Config config;
   std::string faults;

@@ -23,6 +23,7 @@ struct NodeConfig {
   double publish_period = 1.0;
   int marker_limit = 100000;
   std::string cloud_confidence = "frontier";
+  int message_limit = 16000000;
 
   /// Every fault, one sentence each, the mapper's included; empty when the configuration can be used.
   std::vector<std::string> problems() const;
@@ -53,12 +54,20 @@ void for_each_node_field(ConfigT& config, Visitor&& visit) {
         config.marker_limit);
   visit(FieldInfo{"cloud_confidence", "", "which surfels have confidence 1 in point clouds, all others having 0: frontier or occupied"},
         config.cloud_confidence);
+  visit(FieldInfo{"message_limit", "surfel",
+                  "maximum number of surfels in a message: larger updates come in parts; of 16 million, a message has at most 0.9 GB, "
+                  "because roscpp refuses more than 1 GB",
+                  1000, 16000000},
+        config.message_limit);
 }
 
 /// Reads all parameters in the namespace of `pnh`.
 /// @param warnings  gets a sentence for every unknown parameter there, with the known name that is most like it
 /// @throws Error with every fault: wrong types, values out of range
 NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>* warnings);
+
+/// Sets every parameter in the namespace of `pnh` to the value that is in force, defaults included, so that `rosparam get` shows it.
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config);
 
 /// Reads the parameters of the mapper in a running node of this name. @throws Error with every fault
 Config read_mapper_config(const std::string& node);
