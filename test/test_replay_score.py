@@ -7,8 +7,6 @@ import csv
 import json
 import os
 import re
-import resource
-import shutil
 import signal
 import subprocess
 import sys
@@ -51,22 +49,6 @@ def read_surfels(folder, name='surfels.ply'):
     count = int(re.search(rb'element vertex (\d+)', header).group(1))
     assert len(body) == count * SURFEL.itemsize, f'{len(body)} bytes for {count} surfels'
     return numpy.frombuffer(body, dtype=SURFEL)
-
-
-def small_disk(size):
-    """For preexec_fn: files of this process can have `size` bytes only."""
-    def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # so that write() fails, as on a full disk
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-    return limit
-
-
-def read_folder(folder):
-    content = {}
-    for name in os.listdir(folder):
-        with open(os.path.join(folder, name), 'rb') as file:
-            content[name] = file.read()
-    return content
 
 
 class Usage(unittest.TestCase):
@@ -166,7 +148,7 @@ class SyntheticRoom(unittest.TestCase):
         summary, rows = read_json(self.report), read_rows(self.report)
         self.assertEqual(len(rows), FRAMES)
         stages = list(summary['time_ms']['stages'])
-        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms'])
+        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms', 'reason'])
         warm = [float(row['total']) for row in rows[5:]]
         self.assertAlmostEqual(summary['time_ms']['mean'], sum(warm) / len(warm), places=9)
         self.assertEqual(summary['time_ms']['median'], sorted(warm)[len(warm) // 2])
@@ -258,88 +240,6 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(len(read_rows(report)), frames)
         self.assertEqual(len(read_surfels(report)), read_json(report)['surfels']['total'])
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
-
-
-class EarlierReport(unittest.TestCase):
-    """A report stays as it is until the next one can take its place."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.room = os.path.join(cls.folder.name, 'room')
-        subprocess.run([MAKE_SYNTHETIC, cls.room, '--frames', '3', '--size', '160x120'], check=True, stdout=subprocess.DEVNULL)
-        cls.report = os.path.join(cls.folder.name, "the user's report")
-        cls.arguments = ['--report', cls.report, '--set', 'decimation=1', '--octomap-resolution', 0, '--no-exact']
-        result = run(cls.room, *cls.arguments)
-        assert result.returncode == DONE, result.stderr
-        with open(os.path.join(cls.report, 'notes.txt'), 'w', encoding='utf-8') as file:
-            file.write('of the user')
-        cls.before = read_folder(cls.report)
-
-    def check_kept(self, result):
-        self.assertEqual(result.returncode, FAILED, result.stderr)
-        self.assertRegex(result.stderr, r'^(Skipped [^\n]*\n|\.\.\. and [^\n]*\n)*replay_score: [^\n]*\n$')
-        self.assertEqual(read_folder(self.report), self.before)
-
-    def test_mistyped_recording(self):
-        self.check_kept(run(self.room + 'x', *self.arguments))
-        self.check_kept(run(self.room, *self.arguments, '--first', 100))
-
-    def test_damaged_recordings(self):
-        bag = os.path.join(self.folder.name, 'damaged.bag')
-        with open(bag, 'wb') as file:
-            file.write(b'#ROSBAG V2.0\n' + 5000 * b'x')
-        self.check_kept(run(bag, *self.arguments))
-        damaged = os.path.join(self.folder.name, 'damaged')
-        shutil.copytree(self.room, damaged)
-        for name in os.listdir(os.path.join(damaged, 'depth')):
-            with open(os.path.join(damaged, 'depth', name), 'wb') as file:
-                file.write(b'no image')
-        self.check_kept(run(damaged, *self.arguments))
-
-    def test_full_disk(self):
-        self.check_kept(run(self.room, *self.arguments, preexec_fn=small_disk(len(self.before['surfels.ply']) // 2)))
-
-    def test_a_failed_run_leaves_no_folder(self):
-        report = os.path.join(self.folder.name, 'another')
-        run(self.room + 'x', '--report', report)
-        self.assertFalse(os.path.exists(report))
-
-    def test_page_on_a_full_disk(self):
-        script = os.path.join(SOURCES, 'scripts', 'replay_report.py')
-        size = len(self.before['report.html']) // 2
-        result = subprocess.run([script, self.report], capture_output=True, text=True, timeout=60, preexec_fn=small_disk(size))
-        self.assertEqual(result.returncode, FAILED)
-        self.assertRegex(result.stderr, r'^replay_report: [^\n]*File too large[^\n]*\n$')
-        self.assertEqual(read_folder(self.report), self.before)
-
-    def test_interrupted_page(self):
-        script = os.path.join(SOURCES, 'scripts', 'replay_report.py')
-        for delay in (0.05, 0.2, 0.5, 1):
-            process = subprocess.Popen([script, self.report], stderr=subprocess.PIPE, text=True,
-                                       preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}))
-            time.sleep(delay)
-            process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=60)
-            self.assertEqual(errors, '', delay)
-            self.assertIn(process.returncode, (-signal.SIGINT, DONE))
-            self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
-
-    def test_interrupt_while_the_page_is_made(self):
-        report = os.path.join(self.folder.name, "another user's report")
-        process = subprocess.Popen([PROGRAM, self.room, '--report', report, *map(str, self.arguments[2:])], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True, start_new_session=True)
-        deadline = time.monotonic() + 60
-        while not os.path.exists(os.path.join(report, 'summary.json')) and time.monotonic() < deadline:
-            time.sleep(0.005)
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        _, errors = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, FAILED, errors)
-        self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C[^\n]*\n$')
-        self.assertEqual(sorted(os.listdir(report)), ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt'])
-        subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
-        self.assertIn('report.html', os.listdir(report))
 
 
 class Picture(unittest.TestCase):

@@ -193,18 +193,20 @@ void replay_and_score(const Options& options) {
     std::cerr << "Stopped after " << run.frames.size() << " frames, which are now scored and written. Press Ctrl-C again to end at once.\n";
   write_map(folder.unfinished(), run);
 
-  const Scores scores = score(run.surfels, yardsticks, config.threads);
+  const bool is_empty = run.surfels.empty();
+  const Scores scores = is_empty ? Scores() : score(run.surfels, yardsticks, config.threads);
   const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
   write_scores(folder.unfinished(), yardsticks, scores, summary);
   std::cout << result_table(summary) << std::flush;
 
-  if (options.sweep && !run.stopped) {
+  if (options.sweep && !run.stopped && !is_empty) {
     const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
     write_file(folder.unfinished() / "sweep.json", sweep.dump(2) + "\n");
   }
   folder.commit();
   make_report_page(options.report);
   std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
+  if (is_empty) throw empty_map(options.recording, summary);
 }
 
 }  // namespace

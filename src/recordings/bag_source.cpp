@@ -173,6 +173,11 @@ cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) 
   return {};
 }
 
+std::string BagSource::if_still() const {
+  return "record the transform that moves on /tf, or choose another frame with --world-frame; the bag's transforms are: " +
+         transforms_.frames();
+}
+
 void BagSource::note_once(const std::string& sentence) {
   if (std::find(notes_.begin(), notes_.end(), sentence) == notes_.end()) notes_.push_back(sentence);
 }

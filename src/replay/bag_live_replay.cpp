@@ -70,6 +70,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
     return;
   }
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
+  record.depths = count_depths(frame.view().depth, run.config);
   if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view());
   run.frames.push_back(std::move(record));
 }
@@ -146,8 +147,7 @@ FrameReport BagLiveReplay::answer_to(const Played& played, double timeout) {
 }
 
 Run BagLiveReplay::map(Yardsticks* yardsticks, const std::function<bool()>& stop) {
-  Run run;
-  run.config = config();
+  Run run = new_run(*source_, config(), mapper_->device());
   FrameReport report;
   Progress progress("Mapping", static_cast<double>(source_->size()), "frames");
   std::unique_ptr<Played> played = next();
@@ -162,12 +162,11 @@ Run BagLiveReplay::map(Yardsticks* yardsticks, const std::function<bool()>& stop
     run.stopped = stop();
     played = std::move(following);
   }
-  run.skipped.insert(run.skipped.end(), source_->skipped().begin(), source_->skipped().end());
+  finish_run(*source_, run);
   if (run.frames.empty()) throw nothing_usable(recording_, run.skipped);
 
   run.surfels = mapper_->surfels(report.sequence);
   run.statistics = statistics_of(run.surfels, run.frames.back().report);
-  run.device = mapper_->device();
   run.peak_rss_mb = peak_rss_mb();
   return run;
 }

@@ -11,12 +11,14 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "recordings/frame_source.hpp"
+#include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -74,6 +76,20 @@ inline sensor_msgs::Image depth_message(double stamp, std::uint16_t value = 1500
     image.data.push_back(static_cast<std::uint8_t>(value >> 8));
   }
   return image;
+}
+
+/// Depth of 32FC1 with this quantisation.
+inline sensor_msgs::CompressedImage compressed_depth(double stamp, float a, float b) {
+  const messages::CompressedDepthHeader header = {0, {a, b}};
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(100)), png);
+  sensor_msgs::CompressedImage message;
+  message.header = depth_message(stamp).header;
+  message.format = "32FC1; compressedDepth";
+  message.data.resize(sizeof(header));
+  std::memcpy(message.data.data(), &header, sizeof(header));
+  message.data.insert(message.data.end(), png.begin(), png.end());
+  return message;
 }
 
 inline sensor_msgs::Image color_message(double stamp, const std::string& encoding, const std::vector<std::uint8_t>& pixel) {

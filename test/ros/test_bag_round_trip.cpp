@@ -18,6 +18,8 @@ class RoomSource : public FrameSource {
   std::optional<RecordedFrame> next() override { return done_ < frames_.size() ? std::optional(frames_[done_++]) : std::nullopt; }
   const std::vector<std::string>& skipped() const override { return none_; }
   const std::vector<std::string>& notes() const override { return none_; }
+  std::string world_frame() const override { return "world"; }
+  std::string if_still() const override { return {}; }
 
  private:
   std::vector<RecordedFrame> frames_;

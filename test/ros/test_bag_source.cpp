@@ -86,6 +86,33 @@ TEST_F(BagTest, DamagedTransformsAreLeftOut) {
   EXPECT_TRUE(says(source->notes().front(), "2 transforms"));
 }
 
+TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}}) {
+    Handmade(path_).add_camera_and_motion().add("/depth/image/compressedDepth", 10, compressed_depth(10, a, b));
+    EXPECT_TRUE(says(failure(), "/depth/image/compressedDepth cannot be used: its depth quantisation"));
+    Handmade(path_)
+        .add_camera_and_motion()
+        .add("/depth/image/compressedDepth", 10, compressed_depth(10, 100, 0))
+        .add("/depth/image/compressedDepth", 10.5, compressed_depth(10.5, a, b));
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 1u);
+    ASSERT_EQ(source->skipped().size(), 1u);
+    EXPECT_TRUE(says(source->skipped()[0], "quantisation"));
+  }
+}
+
+TEST_F(BagTest, AStillCameraGetsAListOfTheTransforms) {
+  Handmade(path_)
+      .add("/depth/camera_info", 10, info_message(10))
+      .add("/tf_static", 10, tf_message(10, "base", "camera", 1))
+      .add("/tf", 10, tf_message(10, "map", "odom", 1))
+      .add("/depth/image", 10, depth_message(10));
+  const auto source = open_source(path_);
+  EXPECT_EQ(source->world_frame(), "base");
+  EXPECT_TRUE(says(source->if_still(), "map -> odom"));
+}
+
 TEST_F(BagTest, CameraInfoMayChangeAndMustBeThere) {
   Handmade(path_)
       .add_camera_and_motion()

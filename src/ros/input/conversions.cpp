@@ -121,6 +121,10 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 
   CompressedDepthHeader header;
   std::memcpy(&header, message.data.data(), sizeof(header));
+  const auto [a, b] = header.quantisation;
+  if (!std::isfinite(a) || !std::isfinite(b) || a == 0)
+    throw BadFrame("its depth quantisation (" + std::to_string(a) + ", " + std::to_string(b) +
+                   ") is not valid: record it again with compressed_depth_image_transport, or record raw images");
   return metres_from_inverse(values, header.quantisation);
 }
 
