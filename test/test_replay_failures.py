@@ -17,7 +17,7 @@ import numpy
 import PIL.Image
 
 import test_replay_score
-from test_replay_score import DONE, FAILED, SOURCES, read_json, read_rows, run
+from test_replay_score import DONE, FAILED, SOURCES, WRONG_USAGE, read_json, read_rows, run
 
 
 def small_disk(size):
@@ -34,6 +34,30 @@ def read_folder(folder):
         with open(os.path.join(folder, name), 'rb') as file:
             content[name] = file.read()
     return content
+
+
+class CommandLine(unittest.TestCase):
+    def check(self, program, arguments, sentence):
+        result = subprocess.run([program, *arguments], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, WRONG_USAGE, result.stderr)
+        name = os.path.basename(program)
+        self.assertRegex(result.stderr, f'^{name}: {sentence}\nUsage: {name} --help [^\n]*\n$')
+        self.assertEqual(result.stdout, '')
+
+    def test_unknown_options_come_first(self):
+        for arguments, sentence in [(['room', '--reprt', 'x'], r'There is no option --reprt; did you mean --report\?'),
+                                    (['--octomap_resolution=0'], r'There is no option --octomap_resolution; did you mean --octomap-resolution\?'),
+                                    (['--first', '-5', '--xyzzyx'], r'There is no option --xyzzyx\.'),
+                                    (['room'], r'--report is required')]:
+            with self.subTest(arguments=arguments):
+                self.check(test_replay_score.PROGRAM, arguments, sentence)
+
+    def test_other_programs_do_the_same(self):
+        self.check(test_replay_score.MAKE_SYNTHETIC, ['--frame', '3'], r'There is no option --frame; did you mean --frames\?')
+        self.check(test_replay_score.MAKE_SYNTHETIC, [], r'OUT is required')
+        to_bag = os.path.join(os.path.dirname(test_replay_score.PROGRAM), 'sequence_to_bag')
+        if os.path.exists(to_bag):  # a build with ROS
+            self.check(to_bag, ['room', 'x.bag', '--depht-topic', '/x'], r'There is no option --depht-topic; did you mean --depth-topic\?')
 
 
 class EarlierReport(unittest.TestCase):

@@ -138,7 +138,7 @@ Options parse(int argc, char** argv) {
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
                "replay_score");
   declare_options(app, options, raw);
-  read_arguments(app, [&] {
+  read_arguments(app, {arguments.rbegin(), arguments.rend()}, [&] {
     app.parse(arguments);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");

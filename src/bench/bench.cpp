@@ -62,7 +62,7 @@ Options parse(int argc, char** argv) {
   Options options;
   CLI::App app("Measures what a frame costs: prints tables, and writes JSON.", "bench");
   declare_options(app, options);
-  replay::read_arguments(app, [&] {
+  replay::read_arguments(app, {argv + 1, argv + argc}, [&] {
     app.parse(argc, argv);
     if (!options.config_file.empty()) options.config = load_config(options.config_file);
     std::string problems;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
 
@@ -224,10 +225,15 @@ std::string result_table(const ordered_json& summary) {
 }
 
 void write_file(const std::string& path, const std::string& content) {
-  std::ofstream file(path, std::ios::binary);
+  const std::string unfinished = path + ".unfinished";
+  std::ofstream file(unfinished, std::ios::binary);
   file << content;
   file.close();
-  if (!file) throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
+  std::error_code error;
+  if (file) std::filesystem::rename(unfinished, path, error);
+  if (file && !error) return;
+  std::filesystem::remove(unfinished, error);
+  throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
 }
 
 }  // namespace frontier_surfels::replay

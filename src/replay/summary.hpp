@@ -52,7 +52,7 @@ Error empty_map(const Recording& recording, const nlohmann::ordered_json& summar
 /// The main figures of a summary.json, for a terminal.
 std::string result_table(const nlohmann::ordered_json& summary);
 
-/// @throws FileError
+/// Writes a file beside `path`, and puts it there when it is complete. @throws FileError
 void write_file(const std::string& path, const std::string& content);
 
 }  // namespace frontier_surfels::replay
