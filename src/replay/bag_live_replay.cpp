@@ -35,6 +35,9 @@ void init_ros(const std::vector<std::string>& arguments) {
   }
 }
 
+/// time + ahead, or the largest time.
+ros::Time later(const ros::Time& time, const ros::Duration& ahead) { return ros::TIME_MAX - ahead < time ? ros::TIME_MAX : time + ahead; }
+
 Report to_report(const FrameReport& message) {
   Report report;
   report.stamp = message.header.stamp.toSec();
@@ -127,13 +130,13 @@ void BagLiveReplay::begin(const Played& first) {
   mapper_->wait(kHeadStart);
   mapper_->reset();
   player_->send_static_transforms();
-  player_->send_transforms(first.message.getTime() + kTransformsAhead);
+  player_->send_transforms(later(first.message.getTime(), kTransformsAhead));
   player_->send_camera_and_color(first.stamp);
   mapper_->wait(kHeadStart);
 }
 
 void BagLiveReplay::send(const Played& played, const ros::Duration& transforms_ahead) {
-  player_->send_transforms(played.message.getTime() + transforms_ahead);
+  player_->send_transforms(later(played.message.getTime(), transforms_ahead));
   player_->send_depth(played.message, played.stamp);
 }
 
