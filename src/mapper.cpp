@@ -122,7 +122,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   const auto number = static_cast<std::uint32_t>(report.sequence);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(input, config);
+  const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
   Camera& camera = cameras.find(image.intrinsics);
   const Frame frame = begin_frame(image, input.T_world_camera, camera, number);
 

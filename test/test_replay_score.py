@@ -171,7 +171,7 @@ class SyntheticRoom(unittest.TestCase):
         summary, rows = read_json(self.report), read_rows(self.report)
         self.assertEqual(len(rows), FRAMES)
         stages = list(summary['time_ms']['stages'])
-        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms'])
+        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms', 'reason'])
         warm = [float(row['total']) for row in rows[5:]]
         self.assertAlmostEqual(summary['time_ms']['mean'], sum(warm) / len(warm), places=9)
         self.assertEqual(summary['time_ms']['median'], sorted(warm)[len(warm) // 2])

@@ -7,6 +7,7 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/command.hpp"
 #include "frontier_surfels/paths.hpp"
 #include "synthetic/synthetic_room.hpp"
 
@@ -103,8 +104,8 @@ void write_sequence(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.");
-  app.failure_message(CLI::FailureMessage::help);
+  CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.",
+               "make_synthetic");
   app.option_defaults()->always_capture_default();
   app.add_option("OUT", options.output, "folder to write")->required();
   app.add_option("--frames", options.frames, "number of frames along the whole path")->check(CLI::Range(1, 999999));
@@ -130,16 +131,8 @@ int main(int argc, char** argv) {
   app.add_option("--size", size, "width and height of the images [pixel]")->check([&](const std::string& text) {
     return read_size(text, options.width, options.height);
   });
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  return replay::run_command("make_synthetic", "make smaller images (--size).", [&] {
+    replay::parse_arguments(app, argc, argv);
     write_sequence(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -63,7 +63,7 @@ Options parse(int argc, char** argv) {
   Options options;
   CLI::App app("Measures what a frame costs: prints tables, and writes JSON.", "bench");
   declare_options(app, options);
-  replay::read_arguments(app, [&] {
+  replay::read_arguments(app, {argv + 1, argv + argc}, [&] {
     app.parse(argc, argv);
     for (std::string& input : options.inputs) input = absolute_path(input);
     for (std::string* path : {&options.config_file, &options.json}) *path = absolute_path(*path);

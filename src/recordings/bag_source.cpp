@@ -35,7 +35,7 @@ ImageMessage ImageWindow::nearest(const ros::Time& stamp) {
   while (next_ != view_.end() && (window_.empty() || offset(window_.back()) < kColorTolerance)) {
     const ImageMessage image = to_image_message(*next_);
     ++next_;
-    if (image) window_.push_back(image);
+    if (image && is_believed(image.header().stamp)) window_.push_back(image);
     while (!window_.empty() && offset(window_.front()) < -kColorTolerance) window_.pop_front();
   }
   while (!window_.empty() && offset(window_.front()) < -kColorTolerance) window_.pop_front();
@@ -95,8 +95,9 @@ void BagSource::read_transforms_and_cameras() {
   std::stable_sort(cameras_.begin(), cameras_.end(), by_stamp);
   cameras_.erase(std::unique(cameras_.begin(), cameras_.end(), same_camera), cameras_.end());
   if (transforms_.damaged() > 0) {
-    notes_.push_back(std::to_string(transforms_.damaged()) +
-                     " transforms of the bag are left out, because they are not finite, no rotations, or without names.");
+    notes_.push_back(
+        std::to_string(transforms_.damaged()) +
+        " transforms of the bag are left out, because they are not finite, no rotations, without names, or stamped later than in 2038.");
   }
 }
 
@@ -171,6 +172,11 @@ cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) 
     note_once("Some images on " + topics_.color + " cannot be read (" + fault.what() + ")" + without);
   }
   return {};
+}
+
+std::string BagSource::if_still() const {
+  return "record the transform that moves on /tf, or choose another frame with --world-frame; the bag's transforms are: " +
+         transforms_.frames();
 }
 
 void BagSource::note_once(const std::string& sentence) {

@@ -41,6 +41,8 @@ class BagSource : public FrameSource {
   std::optional<RecordedFrame> next() override;
   const std::vector<std::string>& skipped() const override { return skipped_; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::string world_frame() const override { return world_; }
+  std::string if_still() const override;
 
   const rosbag::Bag& bag() const { return bag_; }
   const BagTopics& topics() const { return topics_; }

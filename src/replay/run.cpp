@@ -1,6 +1,7 @@
 #include "replay/run.hpp"
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 
 #include "replay/progress.hpp"
@@ -33,12 +34,29 @@ bool Yardsticks::fit(const Config& config) const {
   return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
 }
 
+Run new_run(const FrameSource& source, const Config& config, const std::string& device) {
+  Run run;
+  run.config = config;
+  run.device = device;
+  run.world_frame = source.world_frame();
+  run.if_still = source.if_still();
+  const std::time_t now = std::time(nullptr);
+  std::tm utc = {};
+  gmtime_r(&now, &utc);
+  char text[40];
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &utc);
+  run.date = text;
+  return run;
+}
+
+void finish_run(const FrameSource& source, Run& run) {
+  run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
+  run.notes = source.notes();
+}
+
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
                const std::function<bool()>& stop) {
-  Run run;
-  run.config = mapper.config();
-  run.device = mapper.device();
-
+  Run run = new_run(source, mapper.config(), mapper.device());
   Progress progress("Mapping", static_cast<double>(source.size()), "frames");
   while (const auto frame = source.next()) {
     const DepthFrame view = frame->view();
@@ -46,6 +64,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       const double cpu_before_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID);
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
       record.cpu_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_before_ms;
+      record.depths = count_depths(view.depth, run.config);
       after_frame(view, record);
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {
@@ -57,7 +76,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       break;
     }
   }
-  run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
+  finish_run(source, run);
   return run;
 }
 

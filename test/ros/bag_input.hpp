@@ -128,9 +128,16 @@ class Handmade {
 
   template <typename Message>
   Handmade& add(const std::string& topic, double time, const Message& message) {
-    bag_.write(topic, ros::Time(time), message);
+    return add_at(topic, ros::Time(time), message);
+  }
+
+  template <typename Message>
+  Handmade& add_at(const std::string& topic, const ros::Time& time, const Message& message) {
+    bag_.write(topic, time, message);
     return *this;
   }
+
+  void close() { bag_.close(); }
 
   /// A message of the first version of tf, which is the same except for the name of its type.
   Handmade& add_of_old_type(const std::string& topic, double time, const tf2_msgs::TFMessage& message) {
