@@ -4,6 +4,7 @@
 
 #include "replay/progress.hpp"
 #include "scoring/cpu_clock.hpp"
+#include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -13,8 +14,8 @@ constexpr std::size_t kSegments = 40000;  // of the exact test: the standard err
 }  // namespace
 
 Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
-  if (exact) exact_.emplace(config.z_min, config.z_max, config.decimation);
-  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config.z_min, config.z_max, config.decimation);
+  if (exact) exact_.emplace(config);
+  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config);
 }
 
 std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
@@ -28,9 +29,7 @@ const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
   return *octomap_boundary_;
 }
 
-bool Yardsticks::fit(const Config& config) const {
-  return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
-}
+bool Yardsticks::fit(const Config& config) const { return scoring::DepthReading(config) == scoring::DepthReading(config_); }
 
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
                const std::function<bool()>& stop) {
