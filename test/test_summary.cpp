@@ -271,6 +271,11 @@ TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   config = Config();
   config.decimation = 8;
   EXPECT_FALSE(yardsticks.fit(config));
+  for (bool Config::*carve : {&Config::carve_no_return, &Config::carve_beyond_range}) {
+    config = Config();
+    config.*carve = true;
+    EXPECT_FALSE(yardsticks.fit(config));
+  }
 }
 
 TEST(Progress, ShowsShareRateAndTimeLeft) {

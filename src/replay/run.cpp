@@ -6,6 +6,7 @@
 
 #include "replay/progress.hpp"
 #include "scoring/cpu_clock.hpp"
+#include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -15,8 +16,8 @@ constexpr std::size_t kSegments = 40000;  // of the exact test: the standard err
 }  // namespace
 
 Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
-  if (exact) exact_.emplace(config.z_min, config.z_max, config.decimation);
-  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config.z_min, config.z_max, config.decimation);
+  if (exact) exact_.emplace(config);
+  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config);
 }
 
 std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
@@ -30,9 +31,7 @@ const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
   return *octomap_boundary_;
 }
 
-bool Yardsticks::fit(const Config& config) const {
-  return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
-}
+bool Yardsticks::fit(const Config& config) const { return scoring::DepthReading(config) == scoring::DepthReading(config_); }
 
 Run new_run(const FrameSource& source, const Config& config, const std::string& device) {
   Run run;

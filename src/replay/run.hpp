@@ -37,7 +37,7 @@ class Yardsticks {
   /// OctoMap's boundary surfels M; computed once, after the last frame.
   const std::vector<Surfel>& octomap_boundary() const;
 
-  /// Whether a map made with `config` can be scored with these yardsticks: they must use the same depth range and the same pixels.
+  /// Whether a map made with `config` can be scored with these yardsticks: they must read depth images alike.
   bool fit(const Config& config) const;
 
  private:
