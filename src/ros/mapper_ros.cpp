@@ -301,7 +301,8 @@ bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& res
     const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
     const std::string path = absolute_path(request.path);
     if (surfels.empty() && std::filesystem::exists(path))
-      throw FileError("The map is empty, and was not written over the existing file " + path + ": delete the file, or choose another path.");
+      throw FileError("The map is empty, and was not written over the existing file " + path +
+                      ": delete the file, or choose another path.");
     write_map(path, surfels);  // on this thread, so that mapping goes on
     const std::string done = std::to_string(surfels.size()) + " surfels were written to " + path + ".";
     ROS_INFO("%s", done.c_str());
