@@ -7,6 +7,7 @@ import unittest
 import rospy
 from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
+from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
 from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
@@ -45,6 +46,19 @@ class Silence(unittest.TestCase):
         topic = self.reason(mapper, '/camera/depth/image_rekt, which no node publishes', 'remap depth/image', '/camera/depth/image_rect')
         clock = self.reason(mapper, '/clock', '/use_sim_time', 'rosbag play --clock')
         self.check_warned_once(process, topic, clock)
+
+    def test_the_last_time_of_the_clock_ends_nothing(self):
+        process, mapper = self.start('endless', 'depth/image:=camera/depth/image_rect')
+        clock = rospy.Publisher('/clock', Clock, queue_size=1)
+        self.addCleanup(clock.unregister)
+        wait_until(lambda: '/endless' in [connection.endpoint_id for connection in clock.impl.connections], what='a listener of /clock')
+        clock.publish(Clock(rospy.Time(4294967295, 999999999)))
+        self.reason(mapper, '/camera/depth/image_rect')
+        self.assertTrue(mapper.pause(False).success)
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        self.assertIn('Check what publishes /clock', output)
 
     def test_topics_that_are_silent(self):
         camera = CameraTopics()

@@ -59,7 +59,7 @@ std::string FrameRemarks::about_distortion(const sensor_msgs::CameraInfo& info) 
   if (distortion_told_ || info.P[0] != 0 || !distorts) return {};
   distortion_told_ = true;
   return "The camera_info has distortion, but no P: the depth images are taken as rectified, with K. If they are not, remap depth/image to "
-         "rectified ones, as those of depth_image_proc or image_proc, or calibrate the camera.";
+         "rectified ones, as those of image_proc, or calibrate the camera.";
 }
 
 std::string FrameRemarks::about_size(const DepthImage& image) {

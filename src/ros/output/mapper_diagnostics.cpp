@@ -15,7 +15,13 @@ MapperDiagnostics::MapperDiagnostics(const ros::NodeHandle& nh, const ros::NodeH
   updater_.setHardwareID(device);
   updater_.add("mapping", this, &MapperDiagnostics::fill);
   // Wall time, because ROS time stands still while a bag is paused.
-  timer_ = ros::NodeHandle(nh).createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  timer_ = ros::NodeHandle(nh).createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) {
+    try {
+      updater_.force_update();
+    } catch (const std::exception& fault) {  // it adds its period to ROS time, which overflows if /clock is at its end
+      ROS_WARN_ONCE("/diagnostics cannot be published: %s. Check what publishes /clock.", fault.what());
+    }
+  });
 }
 
 void MapperDiagnostics::add(const FrameReport& report) {
