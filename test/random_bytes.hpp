@@ -111,11 +111,15 @@ void expect_sentences(int inputs, Read read) {
   std::printf("%d of %d inputs refused\n", refused, inputs);
 }
 
-/// Lets larger allocations fail, so that damaged sizes end in an exception, as they do where memory is short.
-inline void limit_memory(rlim_t bytes) {
+/// Lets the program have 64 MB more than now, or lifts the limit. Damaged sizes then end in std::bad_alloc, as they do where memory is
+/// short.
+inline void limit_memory(bool limited) {
+  constexpr rlim_t kMore = rlim_t{64} << 20;  // [byte]
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
   rlimit limit;
   getrlimit(RLIMIT_AS, &limit);
-  limit.rlim_cur = std::min(bytes, limit.rlim_max);
+  limit.rlim_cur = limited ? std::min(pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + kMore, limit.rlim_max) : limit.rlim_max;
   setrlimit(RLIMIT_AS, &limit);
 }
 

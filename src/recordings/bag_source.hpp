@@ -53,6 +53,7 @@ class BagSource : public FrameSource {
  private:
   void open(const std::string& path);
   void read_transforms_and_cameras();
+  void read_transforms_or_camera(const rosbag::MessageInstance& message);
   void choose_world(const std::string& wanted);
   RecordedFrame read(const rosbag::MessageInstance& message);
   Intrinsics intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const;

@@ -124,7 +124,10 @@ inline tf2_msgs::TFMessage tf_message(double stamp, const std::string& parent, c
 /// Writes messages, at any time.
 class Handmade {
  public:
-  explicit Handmade(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
+  explicit Handmade(const std::string& path, rosbag::CompressionType compression = rosbag::compression::Uncompressed) {
+    bag_.open(path, rosbag::bagmode::Write);
+    bag_.setCompression(compression);
+  }
 
   template <typename Message>
   Handmade& add(const std::string& topic, double time, const Message& message) {

@@ -197,14 +197,15 @@ Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {
   check_region(info);
   sensor_msgs::CameraInfo rectified = info;
   if (info.P[0] == 0) rectified.P = {info.K[0], 0, info.K[2], 0, 0, info.K[4], info.K[5], 0, 0, 0, 1, 0};
-  image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
+  Intrinsics intrinsics;
   try {
+    image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
     model.fromCameraInfo(rectified);
+    const cv::Size size = model.reducedResolution();
+    intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   } catch (const std::exception& error) {
     throw BadFrame("its camera_info cannot be used (" + std::string(error.what()) + ")");
   }
-  const cv::Size size = model.reducedResolution();
-  const Intrinsics intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy}) {
     if (!std::isfinite(number)) throw BadFrame("its camera_info is not finite");
   }
