@@ -180,6 +180,16 @@ class Processes(unittest.TestCase):
         time.sleep(0.3)
         self.check_ends(process)
 
+    def test_help_starts_nothing(self):
+        program = find_node('frontier_surfels', 'mapper_node')[0]
+        for option in ('--help', '-h'):
+            result = subprocess.run([program, '__name:=helpful', option], capture_output=True, text=True, timeout=TIMEOUT,
+                                    env={**os.environ, 'ROS_MASTER_URI': 'http://localhost:1'})  # it would wait for this master for ever
+            self.assertEqual((result.returncode, result.stderr), (0, ''))
+            self.assertRegex(result.stdout, 'usage: .*mapper_node')
+            for word in ('depth/image', '~update', '~get_surfels', 'z_max', 'tf_timeout'):
+                self.assertIn(word, result.stdout)
+
     def test_ends_without_a_frame(self):
         process = self.start('idle')
         Mapper('idle').wait_until_connected()
