@@ -326,6 +326,14 @@ TEST_F(TumFolderTest, ConvertsToMetres) {
   EXPECT_EQ(frames[0].view().depth.encoding, frontier_surfels::DepthImage::Encoding::kMetresF32);
 }
 
+TEST_F(TumFolderTest, TheLargestNumberIsNoMeasurement) {
+  write_tum();
+  write_depth("depth/a.png", 65530);  // the sixth pixel has 65535
+  const std::vector<RecordedFrame> frames = read_all(*open());
+  EXPECT_EQ(frames.at(0).depth.at<float>(1, 0), 65534 / 5000.0f);
+  EXPECT_EQ(frames.at(0).depth.at<float>(1, 1), 0);
+}
+
 TEST_F(TumFolderTest, FrameWhoseImageIsMissingIsPassedOver) {
   write_tum();
   fs::remove(folder_ / "depth/a.png");

@@ -200,14 +200,33 @@ TEST(OctomapTruth, CarvesWhatTheConfigurationSays) {
 }
 
 TEST(OctomapTruth, FrameWithoutMeasurementsAddsNothing) {
-  const std::uint16_t nothing = 0;
+  for (const std::uint16_t nothing : {0, 65535}) {
+    DepthFrame frame;
+    frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kMillimetresU16, &nothing, false};
+    frame.intrinsics = {10, 10, 0, 0, 1, 1};
+    frame.T_world_camera = Eigen::Isometry3d::Identity();
+    Config config = reading(0.5, 3, 1);
+    config.carve_beyond_range = true;
+    OctomapTruth truth(kResolution, config);
+    truth.add(frame);
+    EXPECT_TRUE(truth.boundary().empty()) << nothing;
+  }
+}
+
+TEST(OctomapTruth, SixteenBitsAreInTheConfiguredUnit) {
+  const std::uint16_t steps = 4250;  // 0.85 m
   DepthFrame frame;
-  frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kMillimetresU16, &nothing, false};
+  frame.depth = {1, 1, sizeof(steps), DepthImage::Encoding::kMillimetresU16, &steps, false};
   frame.intrinsics = {10, 10, 0, 0, 1, 1};
-  frame.T_world_camera = Eigen::Isometry3d::Identity();
-  OctomapTruth truth(kResolution, reading(0.5, 3, 1));
+  frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
+  Config config = reading(0.5, 3, 1);
+  config.depth_unit = 0.0002;
+  OctomapTruth truth(kResolution, config);
   truth.add(frame);
-  EXPECT_TRUE(truth.boundary().empty());
+  SlowMap slow;
+  for (int z = 0; z < 9; ++z) slow.miss({0, 0, z});
+  slow.hit({0, 0, 9});
+  expect_same_boundary(truth, slow.boundary(-3, 13));
 }
 
 std::vector<Surfel> at_x(const std::vector<double>& xs) {

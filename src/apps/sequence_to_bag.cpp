@@ -20,6 +20,8 @@ int main(int argc, char** argv) {
   app.add_option("FOLDER", folder, "folder of the recording: depth/ + poses.txt + camera.txt, or TUM RGB-D layout")->required();
   app.add_option("OUT.bag", output, "bag to write")->required();
   app.add_option("--encoding", options.encoding, "encoding of the depth images")->check(CLI::IsMember({"32FC1", "16UC1"}));
+  app.add_option("--depth-unit", options.depth_unit, "one step of the folder's 16-bit depth images [m]; TUM RGB-D layout has its own")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--compressed", options.compressed,
                "write compressedDepth and JPEG images instead of raw ones; depth as 32FC1 is then quantised");
   app.add_option("--compression", options.compression, "compression of the bag")->check(CLI::IsMember({"none", "lz4", "bz2"}));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "frame/view_grid.hpp"
@@ -54,11 +55,13 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
-float to_metres(std::uint16_t millimetres, bool swap_bytes) {
-  return static_cast<float>(swap_bytes ? __builtin_bswap16(millimetres) : millimetres) / 1000.0F;
+/// Sensors write 0 or the largest number where they have measured nothing.
+float to_metres(std::uint16_t steps, bool swap_bytes, double depth_unit) {
+  if (swap_bytes) steps = __builtin_bswap16(steps);
+  return steps == std::numeric_limits<std::uint16_t>::max() ? 0 : static_cast<float>(steps * depth_unit);
 }
 
-float to_metres(std::uint32_t bits, bool swap_bytes) {
+float to_metres(std::uint32_t bits, bool swap_bytes, double) {
   if (swap_bytes) bits = __builtin_bswap32(bits);
   float metres;
   std::memcpy(&metres, &bits, sizeof(metres));
@@ -83,7 +86,7 @@ std::vector<float> read_depth(const DepthImage& image, int width, int height, co
     for (int s = 0; s < width; ++s, row += config.decimation * sizeof(Pixel)) {
       Pixel pixel;
       std::memcpy(&pixel, row, sizeof(pixel));
-      depth.push_back(interpret(to_metres(pixel, image.swap_bytes), config));
+      depth.push_back(interpret(to_metres(pixel, image.swap_bytes, config.depth_unit), config));
     }
   }
   return depth;

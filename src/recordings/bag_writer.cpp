@@ -32,12 +32,12 @@ InverseDepthQuantisation default_quantisation() {
   return {a, 1 - a / kLargestDepth};
 }
 
-/// Depth as CV_32FC1 [m], where NaN means no measurement (REP 118).
-cv::Mat to_metres(const cv::Mat& depth) {
+/// Depth as CV_32FC1 [m], where NaN means no measurement (REP 118). @param depth_unit  of 16-bit images [m]
+cv::Mat to_metres(const cv::Mat& depth, double depth_unit) {
   if (depth.type() == CV_32FC1) return depth;
   cv::Mat metres(depth.size(), CV_32FC1);
-  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [](std::uint16_t value) {
-    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) / kMillimetresPerMetre;
+  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [depth_unit](std::uint16_t value) {
+    return value == 0 || value == 65535 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value * depth_unit);
   });
   return metres;
 }
@@ -47,10 +47,11 @@ std::uint16_t to_sixteen_bits(float value) {
   return std::isfinite(value) && value > 0 && value < 65535.5f ? static_cast<std::uint16_t>(std::lround(value)) : 0;
 }
 
-cv::Mat to_millimetres(const cv::Mat& depth) {
-  if (depth.type() == CV_16UC1) return depth;
+cv::Mat to_millimetres(const cv::Mat& depth, double depth_unit) {
+  if (depth.type() == CV_16UC1 && depth_unit == BagOptions().depth_unit) return depth;
+  const cv::Mat metres = to_metres(depth, depth_unit);
   cv::Mat millimetres(depth.size(), CV_16UC1);
-  std::transform(depth.begin<float>(), depth.end<float>(), millimetres.begin<std::uint16_t>(),
+  std::transform(metres.begin<float>(), metres.end<float>(), millimetres.begin<std::uint16_t>(),
                  [](float value) { return to_sixteen_bits(value * kMillimetresPerMetre); });
   return millimetres;
 }
@@ -158,7 +159,8 @@ class Writer {
   }
 
   void write_depth(const RecordedFrame& frame, const ros::Time& stamp) {
-    const cv::Mat depth = options_.encoding == encodings::TYPE_32FC1 ? to_metres(frame.depth) : to_millimetres(frame.depth);
+    const cv::Mat depth = options_.encoding == encodings::TYPE_32FC1 ? to_metres(frame.depth, options_.depth_unit)
+                                                                     : to_millimetres(frame.depth, options_.depth_unit);
     if (options_.compressed) {
       publish(options_.depth_topic + "/compressedDepth", to_compressed_depth(depth, options_.encoding), stamp);
     } else {
@@ -222,6 +224,7 @@ void check(const BagOptions& options) {
   if (options.encoding != "32FC1" && options.encoding != "16UC1") {
     throw Error("Depth is written as 32FC1 or 16UC1, not as '" + options.encoding + "'.");
   }
+  if (!(options.depth_unit > 0 && std::isfinite(options.depth_unit))) throw Error("The depth unit must be above 0.");
   if (options.compression != "none" && options.compression != "lz4" && options.compression != "bz2") {
     throw Error("A bag's compression is none, lz4 or bz2, not '" + options.compression + "'.");
   }

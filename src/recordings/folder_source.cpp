@@ -200,7 +200,7 @@ RecordedFrame FolderSource::read(const Entry& entry) {
   if (tum_layout_) {
     cv::Mat metres(frame.depth.size(), CV_32FC1);
     std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), metres.begin<float>(),
-                   [](std::uint16_t value) { return static_cast<float>(value) / kTumUnitsPerMetre; });
+                   [](std::uint16_t value) { return value == 65535 ? 0 : static_cast<float>(value) / kTumUnitsPerMetre; });
     frame.depth = metres;
   }
   if (!entry.color.empty()) frame.color = read_color(entry, frame.depth.size());

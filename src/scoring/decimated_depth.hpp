@@ -21,9 +21,10 @@ struct DecimatedDepth {
 
 /// The parameters that say how depth images are read.
 struct DepthReading {
-  double z_min = 0;    ///< [m]
-  double z_max = 0;    ///< [m]
-  int decimation = 1;  ///< [pixel]
+  double z_min = 0;           ///< [m]
+  double z_max = 0;           ///< [m]
+  int decimation = 1;         ///< [pixel]
+  double depth_unit = 0.001;  ///< [m]
   bool carve_no_return = false;
   bool carve_beyond_range = false;
 
@@ -32,17 +33,21 @@ struct DepthReading {
       : z_min(config.z_min),
         z_max(config.z_max),
         decimation(config.decimation),
+        depth_unit(config.depth_unit),
         carve_no_return(config.carve_no_return),
         carve_beyond_range(config.carve_beyond_range) {
     if (!(z_min > 0 && z_max > z_min && std::isfinite(z_max))) {
       throw Error("The depth range must be 0 < z_min < z_max, but is " + std::to_string(z_min) + " to " + std::to_string(z_max) + " m.");
+    }
+    if (!(depth_unit > 0 && std::isfinite(depth_unit))) {
+      throw Error("The depth unit must be above 0, but is " + std::to_string(depth_unit) + " m.");
     }
     if (decimation < 1) throw Error("The decimation must be 1 or more, but is " + std::to_string(decimation) + ".");
   }
 
   bool operator==(const DepthReading& other) const {
     const auto all = [](const DepthReading& r) {
-      return std::tuple(r.z_min, r.z_max, r.decimation, r.carve_no_return, r.carve_beyond_range);
+      return std::tuple(r.z_min, r.z_max, r.decimation, r.depth_unit, r.carve_no_return, r.carve_beyond_range);
     };
     return all(*this) == all(other);
   }
@@ -80,11 +85,12 @@ T read_pixel(const unsigned char* bytes, bool swap_bytes) {
   return value;
 }
 
-/// Depth at a pixel [m], as the image has it: any float, NaN and Inf included.
-inline float read_depth(const DepthImage& image, int column, int row) {
+/// Depth at a pixel [m], as the image has it: any float, NaN and Inf included. Of 16 bits, 65535 is no measurement, like 0.
+inline float read_depth(const DepthImage& image, int column, int row, double depth_unit) {
   const auto* line = static_cast<const unsigned char*>(image.data) + static_cast<std::size_t>(row) * image.step;
   if (image.encoding == DepthImage::Encoding::kMillimetresU16) {
-    return static_cast<float>(read_pixel<std::uint16_t>(line + column * sizeof(std::uint16_t), image.swap_bytes) / 1000.0);
+    const auto steps = read_pixel<std::uint16_t>(line + column * sizeof(std::uint16_t), image.swap_bytes);
+    return steps == 65535 ? 0 : static_cast<float>(steps * depth_unit);
   }
   return read_pixel<float>(line + column * sizeof(float), image.swap_bytes);
 }
@@ -105,7 +111,8 @@ inline DecimatedDepth decimate(const DepthFrame& frame, const DepthReading& read
   DecimatedDepth result{{full.fx / n, full.fy / n, full.cx / n, full.cy / n, full.width / n, full.height / n}, {}};
   result.depth.reserve(static_cast<std::size_t>(result.intrinsics.width) * result.intrinsics.height);
   for (int t = 0; t < result.intrinsics.height; ++t) {
-    for (int s = 0; s < result.intrinsics.width; ++s) result.depth.push_back(meaning(read_depth(frame.depth, n * s, n * t), reading));
+    for (int s = 0; s < result.intrinsics.width; ++s)
+      result.depth.push_back(meaning(read_depth(frame.depth, n * s, n * t, reading.depth_unit), reading));
   }
   return result;
 }

@@ -42,7 +42,7 @@ class ExactTest {
   /// score() uses boundary(segments, kSeed), so that the scores of two maps can be compared.
   static constexpr std::uint64_t kSeed = 1;
 
-  /// @param config  says how the mapper reads depth images: z_min, z_max, decimation, carve_no_return, carve_beyond_range
+  /// @param config  says how the mapper reads depth images: z_min, z_max, decimation, depth_unit and what is carved
   /// @throws Error  if these make no sense
   explicit ExactTest(const Config& config);
   ~ExactTest();

@@ -27,7 +27,7 @@ struct InsertionTime {
 class OctomapTruth {
  public:
   /// @param resolution  side of a voxel [m]
-  /// @param config      says how the mapper reads depth images: z_min, z_max, decimation, carve_no_return, carve_beyond_range
+  /// @param config      says how the mapper reads depth images: z_min, z_max, decimation, depth_unit and what is carved
   /// @throws Error      if these make no sense
   OctomapTruth(double resolution, const Config& config);
   ~OctomapTruth();
