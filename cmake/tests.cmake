@@ -75,12 +75,14 @@ if(NOT FRONTIER_SURFELS_TOOLS)
 endif()
 
 # The programs as a user calls them. /usr/bin/python3 is the Python that has the report's modules.
-add_test(NAME test_replay_score
-  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
+foreach(name test_replay_score test_replay_failures)
+  add_test(NAME ${name}
+    COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/${name}.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
+endforeach()
 add_test(NAME test_bench
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_bench.py $<TARGET_FILE:bench> $<TARGET_FILE:make_synthetic>
     ${PROJECT_SOURCE_DIR}/scripts/bench_table)
-set_tests_properties(test_replay_score test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+set_tests_properties(test_replay_score test_replay_failures test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
 
 if(FRONTIER_SURFELS_WITH_ROS)
   include(cmake/ros_tests.cmake)

@@ -1,10 +1,16 @@
 #!/usr/bin/python3
 """Makes DIR/report.html, a self-contained page, from the files that replay_score has written to DIR."""
-import base64
-import io
-import json
-import os
-import sys
+import signal
+
+# Ctrl-C ends this program without a traceback, also while modules are imported. replay_score starts it with SIGINT blocked.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+import base64  # noqa: E402
+import io  # noqa: E402
+import json  # noqa: E402
+import os  # noqa: E402
+import sys  # noqa: E402
 
 try:
     import jinja2
@@ -196,15 +202,27 @@ def page(folder):
         map_plot=embedded('image/svg+xml', report_plots.map_per_frame(frames, bytes_per_surfel)))
 
 
+def write_page(path, html):
+    """Writes the page beside an earlier one and replaces that only when the new one is complete."""
+    unfinished = path + '.unfinished'
+    try:
+        with open(unfinished, 'w', encoding='utf-8') as file:
+            file.write(html)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    finally:
+        if os.path.exists(unfinished):
+            os.remove(unfinished)
+
+
 def main():
     if len(sys.argv) != 2 or sys.argv[1].startswith('-'):
         print('usage: replay_report.py DIR\n' + __doc__, file=sys.stderr)
         return 2
     folder = sys.argv[1]
     try:
-        html = page(folder)
-        with open(os.path.join(folder, 'report.html'), 'w', encoding='utf-8') as file:
-            file.write(html)
+        write_page(os.path.join(folder, 'report.html'), page(folder))
     except (OSError, ValueError, KeyError, jinja2.TemplateError) as error:
         print(f"replay_report: the report of '{folder}' could not be made: {type(error).__name__}: {error}", file=sys.stderr)
         return 1

@@ -52,8 +52,9 @@ def map_per_frame(frames, bytes_per_surfel):
     index = range(len(frames))
     size.plot(index, frames['surfels'] / 1e6, color=TOTAL, linewidth=1.2)
     size.set(xlabel='frame', ylabel='surfels [million]', title='Map', xlim=(0, max(len(frames) - 1, 1)), ylim=(0, None))
-    memory = size.secondary_yaxis('right', functions=(lambda n: n * bytes_per_surfel, lambda mb: mb / max(bytes_per_surfel, 1e-9)))
-    memory.set_ylabel(f'memory [MB] at {bytes_per_surfel:.1f} bytes a surfel')
+    if bytes_per_surfel > 0:
+        memory = size.secondary_yaxis('right', functions=(lambda n: n * bytes_per_surfel, lambda mb: mb / bytes_per_surfel))
+        memory.set_ylabel(f'memory [MB] at {bytes_per_surfel:.1f} bytes a surfel')
 
     change.plot(index, frames['created'] / 1e3, color=FRONTIER, linewidth=0.9, label='created')
     change.plot(index, frames['removed'] / 1e3, color=OCTOMAP, linewidth=0.9, label='removed')

@@ -9,6 +9,7 @@
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "map/change_readers.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
@@ -33,7 +34,9 @@ Config checked(const Config& config) {
   std::string all;
   for (const auto& problem : problems) all += (all.empty() ? "" : "\n") + problem;
   if (!all.empty()) throw Error(all);
-  return config;
+  Config checked = config;
+  checked.map_folder = absolute_path(config.map_folder);
+  return checked;
 }
 
 /// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
@@ -122,7 +125,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   const auto number = static_cast<std::uint32_t>(report.sequence);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(input, config);
+  const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
   Camera& camera = cameras.find(image.intrinsics);
   const Frame frame = begin_frame(image, input.T_world_camera, camera, number);
 
@@ -246,14 +249,15 @@ Changes Mapper::Impl::changes(std::uint64_t since) {
   return changes;
 }
 
-void Mapper::save(const std::string& path) const {
+std::vector<Surfel> Mapper::whole_map() const {
   std::vector<Surfel> all = surfels();
-  if (impl_->archive) {
-    const std::vector<Surfel> stored = impl_->archive->stored();
-    all.insert(all.end(), stored.begin(), stored.end());
-  }
-  write_map(path, all);
+  if (!impl_->archive) return all;
+  const std::vector<Surfel> stored = impl_->archive->stored();
+  all.insert(all.end(), stored.begin(), stored.end());
+  return all;
 }
+
+void Mapper::save(const std::string& path) const { write_map(path, whole_map()); }
 
 void Mapper::load(const std::string& path) {
   const std::vector<Surfel> surfels = read_map(path);

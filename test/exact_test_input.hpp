@@ -6,12 +6,22 @@
 #include <cstring>
 #include <vector>
 
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
 
 using Eigen::Vector3d;
 using Encoding = DepthImage::Encoding;
+
+/// The default configuration with another depth range [m] and decimation.
+inline Config reading(double z_min, double z_max, int decimation) {
+  Config config;
+  config.z_min = z_min;
+  config.z_max = z_max;
+  config.decimation = decimation;
+  return config;
+}
 
 /// A depth frame that owns its image's bytes, laid out as a driver would deliver them.
 struct OwnedFrame {

@@ -80,7 +80,7 @@ inline std::vector<Surfel> map_of(const Frames& frames, const Config& config) {
 }
 
 inline scoring::ExactScore score(const std::vector<Surfel>& surfels, const Frames& frames, const Config& config) {
-  scoring::ExactTest exact(config.z_min, config.z_max, config.decimation);
+  scoring::ExactTest exact(config);
   for (const auto& frame : frames) exact.add(frame.view());
   return exact.score(surfels);
 }

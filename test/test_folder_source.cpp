@@ -249,6 +249,20 @@ TEST_F(FolderTest, NamesTheLineThatIsMalformed) {
   }
 }
 
+TEST_F(FolderTest, ByteOrderMarksAreNoText) {
+  write_sequence(1);
+  write_text("camera.txt",
+             "\xEF\xBB\xBF"
+             "5 6 1.5 1.25 4 3\n");
+  write_text("poses.txt",
+             "\xEF\xBB\xBF"
+             "0.5 1 2 3 0 0 0 1\n");
+  const std::vector<RecordedFrame> frames = read_all(*open());
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].stamp, 0.5);
+  EXPECT_EQ(frames[0].intrinsics.fx, 5);
+}
+
 /// The layout of TUM RGB-D, where the stamps of depth, colour and poses differ.
 class TumFolderTest : public FolderTest {
  protected:
@@ -280,6 +294,25 @@ TEST_F(TumFolderTest, TakesTheNearestWithinTwentyMilliseconds) {
   ASSERT_EQ(source->skipped().size(), 1u);
   EXPECT_TRUE(says(source->skipped()[0], "b.png"));
   EXPECT_TRUE(says(source->skipped()[0], "20 ms"));
+}
+
+TEST_F(TumFolderTest, SortsImagesByTheirStamps) {
+  write_tum();
+  EXPECT_TRUE(open()->notes().empty());
+  write_text("depth.txt",
+             "\xEF\xBB\xBF"
+             "10.200 depth/c.png\n10.000 depth/a.png\n10.100 depth/b.png\n");
+  write_text("rgb.txt",
+             "\xEF\xBB\xBF"
+             "9.985 rgb/a.png\n10.179 rgb/a.png\n");
+  const auto source = open();
+  const std::vector<RecordedFrame> frames = read_all(*source);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].stamp, 10.0);
+  EXPECT_EQ(frames[1].stamp, 10.2);
+  ASSERT_EQ(source->notes().size(), 1u);
+  EXPECT_TRUE(says(source->notes()[0], "depth.txt"));
+  EXPECT_TRUE(says(source->notes()[0], "sorted"));
 }
 
 TEST_F(TumFolderTest, ConvertsToMetres) {

@@ -82,9 +82,11 @@ TEST_F(MapperArchive, AReopenedFolderGoesOnWithItsMap) {
   Mapper mapper(walking(path_));
   EXPECT_EQ(mapper.size(), 0u) << "nothing is near before the first frame";
   EXPECT_TRUE(same(saved(mapper), before));
+  EXPECT_TRUE(same(sorted(mapper.whole_map()), before));
   const Report again = mapper.integrate(frames[0].view());
   EXPECT_GT(again.surfels, first.surfels);
   EXPECT_LT(mapper.size(), before.size()) << "only near blocks are in memory";
+  EXPECT_LT(mapper.size(), mapper.whole_map().size());
   EXPECT_LT(again.created, first.created / 30) << "the space is known already";
   for (const auto& frame : frames) mapper.integrate(frame.view());
   const auto after = static_cast<double>(saved(mapper).size());

@@ -16,6 +16,7 @@ import unittest
 
 import matplotlib.image
 import numpy
+from PIL import Image as Picture
 
 PROGRAM, MAKE_SYNTHETIC = None, None
 FRAMES = 16
@@ -89,6 +90,28 @@ class Usage(unittest.TestCase):
             with self.subTest(arguments=arguments):
                 self.check_refused(FAILED, sentence, arguments=arguments)
 
+    def test_names_that_are_too_long(self):
+        name = 300 * 'n'
+        for arguments in ([name, '--report', self.folder.name], [self.folder.name, '--report', self.folder.name, '--config', name]):
+            self.check_refused(1, name, arguments=arguments)
+        result = subprocess.run([MAKE_SYNTHETIC, name], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, '^[^\\n]*' + name + r'[^\n]*choose another folder\.\n$')
+
+    def test_a_tilde_that_no_shell_has_expanded_is_the_home_folder(self):
+        environment = {**os.environ, 'HOME': self.folder.name}
+        made = subprocess.run([MAKE_SYNTHETIC, "~/it's a room", '--frames', '2', '--size', '160x120'], capture_output=True, text=True,
+                              timeout=60, env=environment)
+        room = os.path.join(self.folder.name, "it's a room")
+        self.assertEqual((made.stdout, made.stderr), (f'2 frames are in {room}.\n', ''))
+        with open(os.path.join(self.folder.name, 'config.yaml'), 'w', encoding='utf-8') as file:
+            file.write('recent_views: 3\n')
+        result = run("~/it's a room", '--report=~/report', '--config=~/config.yaml', '--octomap-resolution', 0, '--no-exact', env=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        summary = read_json(os.path.join(self.folder.name, 'report'))
+        self.assertEqual((summary['input']['path'], summary['config']['recent_views']), (room, 3))
+        self.assertIn(os.path.join(self.folder.name, 'report', 'report.html'), result.stdout)
+
     def test_help_and_parameters_need_nothing_else(self):
         usage = run('--help')
         self.assertEqual((usage.returncode, usage.stderr), (DONE, ''))
@@ -148,7 +171,7 @@ class SyntheticRoom(unittest.TestCase):
         summary, rows = read_json(self.report), read_rows(self.report)
         self.assertEqual(len(rows), FRAMES)
         stages = list(summary['time_ms']['stages'])
-        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms'])
+        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms', 'reason'])
         warm = [float(row['total']) for row in rows[5:]]
         self.assertAlmostEqual(summary['time_ms']['mean'], sum(warm) / len(warm), places=9)
         self.assertEqual(summary['time_ms']['median'], sorted(warm)[len(warm) // 2])
@@ -242,7 +265,37 @@ class SyntheticRoom(unittest.TestCase):
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
 
 
-class Picture(unittest.TestCase):
+class MapFolder(unittest.TestCase):
+    """A recording of two walls, so far from each other that only the second one is in memory at the end."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.recording, self.report, self.kept = (os.path.join(self.folder.name, name) for name in ('walls', 'report', 'kept'))
+        os.makedirs(os.path.join(self.recording, 'depth'))
+        for frame in range(2):
+            Picture.fromarray(numpy.full((60, 80), 1500, dtype=numpy.uint16)).save(os.path.join(self.recording, 'depth', f'{frame:04}.png'))
+        for name, text in (('camera.txt', '70 70 39.5 29.5 80 60\n'), ('poses.txt', '0 0 0 0 0 0 0 1\n1 200 0 0 0 0 0 1\n')):
+            with open(os.path.join(self.recording, name), 'w', encoding='utf-8') as file:
+                file.write(text)
+
+    def replay(self):
+        return run(self.recording, '--report', self.report, '--set', f'map_folder={self.kept}', '--set', 'eviction_radius=10',
+                   '--set', 'decimation=1', '--no-exact')
+
+    def test_the_report_has_the_whole_map(self):
+        result = self.replay()
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        surfels = read_surfels(self.report)
+        self.assertGreater(min((surfels['x'] < 100).sum(), (surfels['x'] > 100).sum()), 1000)
+        self.assertEqual(read_json(self.report)['surfels']['total'], len(surfels))
+        with self.subTest('the map of another run is not scored as that of this recording'):
+            again = self.replay()
+            self.assertEqual(again.returncode, FAILED, again.stdout)
+            self.assertRegex(again.stderr, 'kept.*already has a map.*another')
+
+
+class ReadmePicture(unittest.TestCase):
     """README's picture."""
 
     def blue_share(self, panel):

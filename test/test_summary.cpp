@@ -36,6 +36,7 @@ FrameRecord frame(int i) {
   record.report.stages = {{"sweeps", (i + 1) / 4.0}};
   if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
   record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
+  record.depths.usable = 1;
   record.octomap = scoring::InsertionTime{100.0 * (i + 1), 90.0 * (i + 1)};
   return record;
 }
@@ -114,7 +115,8 @@ TEST(StageNames, StagesThatStartLaterTakeTheirPlace) {
 TEST(Summary, HasExactlyTheKeysOfTheInterface) {
   const Yardsticks yardsticks(Config(), 0.02, true);
   const ordered_json json = summary_json({"a/folder", {}}, 0.02, run_of(12), yardsticks, some_scores());
-  EXPECT_EQ(keys(json), (Keys{"input", "config", "device", "surfels", "time_ms", "memory_mb", "octomap", "exact"}));
+  EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
+                              "surfels", "time_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
   EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes"}));
   EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
@@ -180,12 +182,12 @@ TEST(FramesCsv, NumbersReadBackExactly) {
   std::istringstream csv(frames_csv(records));
   std::string line;
   ASSERT_TRUE(std::getline(csv, line));
-  EXPECT_EQ(line, "stamp,surfels,created,removed,sweeps,median,total,octomap_ms");
+  EXPECT_EQ(line, "stamp,surfels,created,removed,sweeps,median,total,octomap_ms,reason");
   for (const FrameRecord& record : records) {
     ASSERT_TRUE(std::getline(csv, line));
     std::vector<double> values;
     std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) values.push_back(std::stod(cell));
+    for (std::string cell; std::getline(cells, cell, ',') && !cell.empty();) values.push_back(std::stod(cell));
     const Report& report = record.report;
     const double median = report.stages.size() > 1 ? report.stages[1].ms : 0;
     const std::vector<double> expected = {report.stamp,
@@ -204,7 +206,7 @@ TEST(FramesCsv, NumbersReadBackExactly) {
 TEST(FramesCsv, HasNoOctomapColumnWithoutOctomap) {
   std::vector<FrameRecord> records = frames(1);
   records[0].octomap.reset();
-  EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total\n1305031102.160407,1000,1200,200,0.25,1.0\n");
+  EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total,reason\n1305031102.160407,1000,1200,200,0.25,1.0,\n");
 }
 
 TEST(Trajectory, IsInTumsFormat) {
@@ -253,6 +255,12 @@ TEST(Sweep, RefusesWhatItCannotDo) {
   }
 }
 
+TEST(Sweep, RefusesToBeginWithAnotherValuesMap) {
+  Config base;
+  base.map_folder = "kept";
+  EXPECT_THROW(parse_sweep("th_d=0.1:0.2:2", base), Error);
+}
+
 TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   const Yardsticks yardsticks(Config(), 0, false);
   Config config;
@@ -263,6 +271,11 @@ TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   config = Config();
   config.decimation = 8;
   EXPECT_FALSE(yardsticks.fit(config));
+  for (bool Config::*carve : {&Config::carve_no_return, &Config::carve_beyond_range}) {
+    config = Config();
+    config.*carve = true;
+    EXPECT_FALSE(yardsticks.fit(config));
+  }
 }
 
 TEST(Progress, ShowsShareRateAndTimeLeft) {

@@ -32,11 +32,15 @@ class Mapper {
   /// @throws DeviceError  the device failed or is out of memory
   Report integrate(const DepthFrame& frame);
 
-  /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame.
+  /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame. The whole map is
+  /// whole_map().
   std::vector<Surfel> surfels() const;
 
-  /// The surfels whose centre lies in a box of the world frame [m].
+  /// The surfels of surfels() whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
+
+  /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
+  std::vector<Surfel> whole_map() const;
 
   /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact. Those of earlier
   /// frames may also contain unchanged surfels near changed ones, and ids that were free before. Surfels that move to the map folder are
@@ -64,6 +68,7 @@ class Mapper {
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
   void reset();
 
+  /// Counts the surfels of surfels().
   Statistics statistics() const;
   std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
   std::uint64_t sequence() const;

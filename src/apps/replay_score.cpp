@@ -2,15 +2,16 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <optional>
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "frontier_surfels/ply.hpp"
 #include "replay/live_replay.hpp"
+#include "replay/report_folder.hpp"
 #include "replay/report_page.hpp"
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
@@ -138,8 +139,10 @@ Options parse(int argc, char** argv) {
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
                "replay_score");
   declare_options(app, options, raw);
-  read_arguments(app, [&] {
+  read_arguments(app, {arguments.rbegin(), arguments.rend()}, [&] {
     app.parse(arguments);
+    // With --report=~/x and in launch files no shell has expanded the `~`.
+    for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
     // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
@@ -158,21 +161,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-/// Makes the folder, checks that it can be written before a long run starts, and removes the files of an earlier run.
-void prepare_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  const fs::path probe = folder / "summary.json";
-  if (!fs::is_directory(folder) || !std::ofstream(probe)) {
-    throw FileError("The report's folder '" + folder.string() + "' cannot be made or written: choose another with --report.");
-  }
-  for (const char* name :
-       {"summary.json", "frames.csv", "trajectory.txt", "surfels.ply", "octomap.ply", "verdicts.bin", "sweep.json", "report.html"}) {
-    fs::remove(folder / name, error);
-  }
-}
-
-/// Writes what is known before the map is scored, so that it is kept if scoring is interrupted.
+/// Writes what is known before the map is scored, so that it is kept if the program is ended while it scores.
 void write_map(const fs::path& folder, const Run& run) {
   write_ply(folder / "surfels.ply", run.surfels);
   write_file(folder / "frames.csv", frames_csv(run.frames));
@@ -194,11 +183,10 @@ void tell_skipped(const std::vector<std::string>& skipped) {
 }
 
 void replay_and_score(const Options& options) {
-  const fs::path folder = options.report;
   catch_first_interrupt();
   auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
   const Config config = live ? live->config() : options.config;
-  prepare_folder(folder);
+  ReportFolder folder(options.report);
 
   Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
   const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
@@ -206,19 +194,22 @@ void replay_and_score(const Options& options) {
   tell_skipped(run.skipped);
   if (run.stopped)
     std::cerr << "Stopped after " << run.frames.size() << " frames, which are now scored and written. Press Ctrl-C again to end at once.\n";
-  write_map(folder, run);
+  write_map(folder.unfinished(), run);
 
-  const Scores scores = score(run.surfels, yardsticks, config.threads);
+  const bool is_empty = run.surfels.empty();
+  const Scores scores = is_empty ? Scores() : score(run.surfels, yardsticks, config.threads);
   const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
-  write_scores(folder, yardsticks, scores, summary);
+  write_scores(folder.unfinished(), yardsticks, scores, summary);
   std::cout << result_table(summary) << std::flush;
 
-  if (options.sweep && !run.stopped) {
+  if (options.sweep && !run.stopped && !is_empty) {
     const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
-    write_file(folder / "sweep.json", sweep.dump(2) + "\n");
+    write_file(folder.unfinished() / "sweep.json", sweep.dump(2) + "\n");
   }
-  make_report_page(folder);
-  std::cout << "report      " << (folder / "report.html").string() << "\n";
+  folder.commit();
+  make_report_page(options.report);
+  std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
+  if (is_empty) throw empty_map(options.recording, summary);
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <string>
 
+#include "frame/view_grid.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -14,10 +16,6 @@ void check_depth(const DepthImage& image, const Config& config) {
   if (image.width < config.decimation || image.height < config.decimation)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
                    std::to_string(config.decimation) + "; lower decimation.");
-  constexpr int kLargest = 16384;  // [pixel]; pixel numbers in the cuboid's tables have 16 bits
-  if (image.width > kLargest || image.height > kLargest)
-    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
-                   size_text(kLargest, kLargest) + ".");
   if (image.data == nullptr) throw BadFrame("The depth image has no data.");
   if (image.step < image.width * pixel)
     throw BadFrame("The depth image's rows of " + std::to_string(image.step) + " bytes are shorter than its " +
@@ -108,20 +106,20 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }
 
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels) {
   check_depth(frame.depth, config);
   check_intrinsics(frame.intrinsics, frame.depth);
+  check_grid_size(frame.intrinsics, config, max_voxels);
   check_pose(frame.T_world_camera);
   if (frame.color) check_color(*frame.color, frame.depth);
 
-  const int step = config.decimation, width = frame.depth.width / step, height = frame.depth.height / step;
-  const Intrinsics& full = frame.intrinsics;
   WorkingImage image;
-  image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
+  image.intrinsics = decimated(frame.intrinsics, config.decimation);
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
   image.depth = frame.depth.encoding == DepthImage::Encoding::kMillimetresU16
                     ? read_depth<std::uint16_t>(frame.depth, width, height, config)
                     : read_depth<std::uint32_t>(frame.depth, width, height, config);
-  if (frame.color) image.color = read_color(*frame.color, width, height, step);
+  if (frame.color) image.color = read_color(*frame.color, width, height, config.decimation);
   return image;
 }
 

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 
 #include "ros/input/conversions.hpp"
@@ -108,12 +109,25 @@ std::vector<Link> constant_links() {
           {"openni_rgb_frame", "openni_rgb_optical_frame", optical}};
 }
 
+/// The destructor of a bag that is open closes it, and ends the program if that fails, as it does on a full disk. A bag that could not be
+/// closed is therefore kept and never destroyed.
+struct BagDeleter {
+  void operator()(rosbag::Bag* bag) const {
+    static auto* const unclosed = new std::vector<rosbag::Bag*>();
+    if (bag->isOpen()) {
+      unclosed->push_back(bag);
+    } else {
+      delete bag;
+    }
+  }
+};
+
 class Writer {
  public:
   Writer(const std::string& path, const BagOptions& options) : options_(options), links_(constant_links()) {
-    bag_.open(path, rosbag::bagmode::Write);
-    if (options.compression == "lz4") bag_.setCompression(rosbag::compression::LZ4);
-    if (options.compression == "bz2") bag_.setCompression(rosbag::compression::BZ2);
+    bag_->open(path, rosbag::bagmode::Write);
+    if (options.compression == "lz4") bag_->setCompression(rosbag::compression::LZ4);
+    if (options.compression == "bz2") bag_->setCompression(rosbag::compression::BZ2);
   }
 
   void write(const RecordedFrame& frame, const ros::Time& stamp) {
@@ -123,7 +137,7 @@ class Writer {
     first_ = false;
   }
 
-  void close() { bag_.close(); }
+  void close() { bag_->close(); }
 
  private:
   void write_transforms(const Eigen::Isometry3d& T_world_camera, const ros::Time& stamp) {
@@ -138,9 +152,9 @@ class Writer {
     if (!options_.static_transforms) {
       moving.transforms.insert(moving.transforms.end(), constant.transforms.begin(), constant.transforms.end());
     } else if (first_) {
-      bag_.write("/tf_static", stamp, constant, latched_header());
+      bag_->write("/tf_static", stamp, constant, latched_header());
     }
-    bag_.write("/tf", stamp, moving);
+    bag_->write("/tf", stamp, moving);
   }
 
   void write_depth(const RecordedFrame& frame, const ros::Time& stamp) {
@@ -166,7 +180,7 @@ class Writer {
   void publish(const std::string& topic, Message message, const ros::Time& stamp) {
     message.header.stamp = stamp;
     message.header.frame_id = frame_name("openni_rgb_optical_frame");
-    bag_.write(topic, stamp, message);
+    bag_->write(topic, stamp, message);
   }
 
   std::string frame_name(const std::string& name) const { return (options_.leading_slashes ? "/" : "") + name; }
@@ -200,7 +214,7 @@ class Writer {
 
   BagOptions options_;
   std::vector<Link> links_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag, BagDeleter> bag_{new rosbag::Bag()};
   bool first_ = true;
 };
 

@@ -134,7 +134,13 @@ void FolderSource::list_tum_images() {
   if (fs::exists(folder_ / "rgb.txt")) colors = read_file_list(folder_ / "rgb.txt");
   std::stable_sort(colors.begin(), colors.end(), by_stamp);
 
-  for (const StampedFile& image : read_file_list(folder_ / "depth.txt")) {
+  std::vector<StampedFile> images = read_file_list(folder_ / "depth.txt");
+  if (!std::is_sorted(images.begin(), images.end(), by_stamp)) {
+    std::stable_sort(images.begin(), images.end(), by_stamp);
+    notes_.push_back("The images of " + (folder_ / "depth.txt").string() +
+                     " are not listed in the order of their stamps: they are sorted.");
+  }
+  for (const StampedFile& image : images) {
     const StampedPose* pose = nearest(poses, image.stamp);
     const StampedFile* color = nearest(colors, image.stamp);
     entries_.push_back(

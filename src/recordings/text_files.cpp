@@ -19,6 +19,8 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
   std::vector<Line> lines;
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {
+    constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";  // some editors begin UTF-8 files with it
+    if (number == 1 && text.compare(0, 3, kByteOrderMark) == 0) text.erase(0, 3);
     std::istringstream stream(text.substr(0, text.find('#')));
     Line line{path.string() + ", line " + std::to_string(number), {}};
     for (std::string word; stream >> word;) line.words.push_back(word);

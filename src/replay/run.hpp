@@ -12,6 +12,7 @@
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 #include "frontier_surfels/types.hpp"
 #include "recordings/frame_source.hpp"
+#include "replay/depth_census.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -36,7 +37,7 @@ class Yardsticks {
   /// OctoMap's boundary surfels M; computed once, after the last frame.
   const std::vector<Surfel>& octomap_boundary() const;
 
-  /// Whether a map made with `config` can be scored with these yardsticks: they must use the same depth range and the same pixels.
+  /// Whether a map made with `config` can be scored with these yardsticks: they must read depth images alike.
   bool fit(const Config& config) const;
 
  private:
@@ -50,20 +51,31 @@ struct FrameRecord {
   Report report;
   Eigen::Isometry3d T_world_camera;
   std::optional<scoring::InsertionTime> octomap;
+  DepthCensus depths = {};
   double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
 };
 
 /// The result of mapping a recording.
 struct Run {
   Config config;
+  std::string date;         ///< of the start, UTC, as 2020-12-31T23:59:59Z
+  std::string world_frame;  ///< of the poses
+  std::string if_still;     ///< see FrameSource
   std::string device;
   std::vector<FrameRecord> frames;
   std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
+  std::vector<std::string> notes;    ///< see FrameSource
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
   bool stopped = false;    ///< before the end of the recording
 };
+
+/// A run that has not begun: its date is now, and it knows where the poses come from.
+Run new_run(const FrameSource& source, const Config& config, const std::string& device);
+
+/// Adds the notes of the source, and its skipped frames to those of the mapper.
+void finish_run(const FrameSource& source, Run& run);
 
 /// Maps the remaining frames of `source`. Does not set the surfels, the statistics and the peak memory of the result.
 /// @param after_frame  called with every frame that the mapper took, and its record

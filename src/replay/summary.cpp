@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
+
+#include "replay/warnings.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -112,11 +115,28 @@ ordered_json exact_json(const scoring::ExactScore& score) {
           {"miss_1cm", score.miss_1cm},   {"miss_2cm", score.miss_2cm},   {"miss_5cm", score.miss_5cm}, {"label_ok", score.label_ok}};
 }
 
+ordered_json reasons_json(const std::vector<FrameRecord>& frames) {
+  const bool still = is_still(frames);
+  ordered_json counts = ordered_json::object();
+  for (const FrameRecord& frame : frames) {
+    const std::string why = reason(frame, still);
+    if (!why.empty()) counts[why] = counts.value(why, 0) + 1;
+  }
+  return counts;
+}
+
 ordered_json summary_json(const Recording& recording, double octomap_resolution, const Run& run, const Yardsticks& yardsticks,
                           const Scores& scores) {
   const std::vector<FrameRecord> warm = warm_frames(run.frames);
   ordered_json json;
   json["input"] = {{"path", recording.path}, {"frames", run.frames.size()}, {"skipped", run.skipped.size()}};
+  json["version"] = FRONTIER_SURFELS_VERSION;
+  json["date"] = run.date;
+  json["world_frame"] = run.world_frame;
+  json["warnings"] = warnings(run);
+  json["reasons"] = reasons_json(run.frames);
+  json["notes"] = run.notes;
+  json["skipped"] = run.skipped;
   json["config"] = config_json(run.config);
   json["device"] = run.device;
   json["surfels"] = {{"total", run.statistics.surfels},
@@ -135,12 +155,20 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
   return json;
 }
 
+Error empty_map(const Recording& recording, const ordered_json& summary) {
+  std::string why;
+  for (const auto& warning : summary["warnings"]) why += " " + warning.get<std::string>();
+  if (why.empty()) why = " No frame has seen a surface or free space: check the depth images, and z_min and z_max.";
+  return Error("The map of '" + recording.path + "' is empty." + why);
+}
+
 std::string frames_csv(const std::vector<FrameRecord>& frames) {
   const std::vector<std::string> stages = stage_names(frames);
+  const bool still = is_still(frames);
   const bool octomap = !frames.empty() && frames.front().octomap.has_value();
   std::string csv = "stamp,surfels,created,removed,";
   for (const std::string& name : stages) csv += name + ",";
-  csv += octomap ? "total,octomap_ms\n" : "total\n";
+  csv += octomap ? "total,octomap_ms,reason\n" : "total,reason\n";
   for (const FrameRecord& frame : frames) {
     const Report& report = frame.report;
     csv += exact_text(report.stamp) + "," + std::to_string(report.surfels) + "," + std::to_string(report.created) + "," +
@@ -148,7 +176,7 @@ std::string frames_csv(const std::vector<FrameRecord>& frames) {
     for (const std::string& name : stages) csv += exact_text(stage_ms(frame, name)) + ",";
     csv += exact_text(report.total_ms);
     if (octomap) csv += "," + exact_text(octomap_ms(frame));
-    csv += "\n";
+    csv += "," + reason(frame, still) + "\n";
   }
   return csv;
 }
@@ -186,14 +214,26 @@ std::string result_table(const ordered_json& summary) {
     table += formatted("OctoMap     median %.1f ms a frame, %.1f MB; FDR %.2f %%, FOR %.2f %% at 5 cm\n", octomap["time_ms"]["median"],
                        octomap["memory_mb"], percent(octomap["fdr"]), percent(octomap["for"]));
   }
+  for (const char* kind : {"warnings", "notes"}) {
+    constexpr std::size_t kShown = 5;
+    const auto& sentences = summary[kind];
+    for (std::size_t i = 0; i < std::min(sentences.size(), kShown); ++i)
+      table += (kind == std::string("warnings") ? "WARNING     " : "note        ") + sentences[i].get<std::string>() + "\n";
+    if (sentences.size() > kShown) table += "            ... and " + std::to_string(sentences.size() - kShown) + " more in summary.json.\n";
+  }
   return table;
 }
 
 void write_file(const std::string& path, const std::string& content) {
-  std::ofstream file(path, std::ios::binary);
+  const std::string unfinished = path + ".unfinished";
+  std::ofstream file(unfinished, std::ios::binary);
   file << content;
   file.close();
-  if (!file) throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
+  std::error_code error;
+  if (file) std::filesystem::rename(unfinished, path, error);
+  if (file && !error) return;
+  std::filesystem::remove(unfinished, error);
+  throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
 }
 
 }  // namespace frontier_surfels::replay

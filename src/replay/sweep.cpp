@@ -72,6 +72,9 @@ ordered_json point_json(double value, const Run& run, const Scores& scores) {
 }  // namespace
 
 Sweep parse_sweep(const std::string& text, const Config& base) {
+  if (!base.map_folder.empty())
+    throw Error("--sweep: every value begins with an empty map, but map_folder '" + base.map_folder +
+                "' would keep the map of the one before: leave map_folder out.");
   static const std::regex kForm("([a-z_0-9]+)=([^:]+):([^:]+):([0-9]{1,4})");
   std::smatch part;
   if (!std::regex_match(text, part, kForm)) throw Error("--sweep '" + text + "' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9.");

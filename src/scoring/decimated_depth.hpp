@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
@@ -14,21 +16,35 @@ namespace frontier_surfels::scoring {
 /// Every `decimation`-th pixel of a depth image, and the camera that would have taken it.
 struct DecimatedDepth {
   Intrinsics intrinsics;
-  std::vector<float> depth;  ///< depth[height][width] [m]; 0: no measurement
+  std::vector<float> depth;  ///< depth[height][width] [m]: > 0 a surface, < 0 free space up to -depth, 0 no measurement
 };
 
-/// Which depths are measurements, and how many pixels are used.
-struct DepthRange {
+/// The parameters that say how depth images are read.
+struct DepthReading {
   double z_min = 0;    ///< [m]
   double z_max = 0;    ///< [m]
   int decimation = 1;  ///< [pixel]
+  bool carve_no_return = false;
+  bool carve_beyond_range = false;
 
   /// @throws Error if the numbers make no sense
-  void check() const {
+  explicit DepthReading(const Config& config)
+      : z_min(config.z_min),
+        z_max(config.z_max),
+        decimation(config.decimation),
+        carve_no_return(config.carve_no_return),
+        carve_beyond_range(config.carve_beyond_range) {
     if (!(z_min > 0 && z_max > z_min && std::isfinite(z_max))) {
       throw Error("The depth range must be 0 < z_min < z_max, but is " + std::to_string(z_min) + " to " + std::to_string(z_max) + " m.");
     }
     if (decimation < 1) throw Error("The decimation must be 1 or more, but is " + std::to_string(decimation) + ".");
+  }
+
+  bool operator==(const DepthReading& other) const {
+    const auto all = [](const DepthReading& r) {
+      return std::tuple(r.z_min, r.z_max, r.decimation, r.carve_no_return, r.carve_beyond_range);
+    };
+    return all(*this) == all(other);
   }
 };
 
@@ -73,19 +89,23 @@ inline float read_depth(const DepthImage& image, int column, int row) {
   return read_pixel<float>(line + column * sizeof(float), image.swap_bytes);
 }
 
-/// Nearest neighbour: pixel (s, t) is (decimation s, decimation t) of the image. The limits are compared as floats, like the depths.
-inline DecimatedDepth decimate(const DepthFrame& frame, const DepthRange& range) {
+/// What a raw depth [m] says; see DecimatedDepth::depth. The limits are compared as floats, like the depths.
+inline float meaning(float d, const DepthReading& reading) {
+  const float z_min = static_cast<float>(reading.z_min), z_max = static_cast<float>(reading.z_max);
+  if (d >= z_min && d <= z_max) return d;
+  if (!(d > z_max)) return 0;
+  return (std::isinf(d) ? reading.carve_no_return : reading.carve_beyond_range) ? -z_max : 0;
+}
+
+/// Nearest neighbour: pixel (s, t) is (decimation s, decimation t) of the image.
+inline DecimatedDepth decimate(const DepthFrame& frame, const DepthReading& reading) {
   check_frame(frame);
-  const int n = range.decimation;
+  const int n = reading.decimation;
   const Intrinsics& full = frame.intrinsics;
   DecimatedDepth result{{full.fx / n, full.fy / n, full.cx / n, full.cy / n, full.width / n, full.height / n}, {}};
   result.depth.reserve(static_cast<std::size_t>(result.intrinsics.width) * result.intrinsics.height);
-  const float z_min = static_cast<float>(range.z_min), z_max = static_cast<float>(range.z_max);
   for (int t = 0; t < result.intrinsics.height; ++t) {
-    for (int s = 0; s < result.intrinsics.width; ++s) {
-      const float d = read_depth(frame.depth, n * s, n * t);
-      result.depth.push_back(d >= z_min && d <= z_max ? d : 0.f);
-    }
+    for (int s = 0; s < result.intrinsics.width; ++s) result.depth.push_back(meaning(read_depth(frame.depth, n * s, n * t), reading));
   }
   return result;
 }

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
+#include <fstream>
 
+#include "file_size_limit.hpp"
 #include "recordings/bag_writer.hpp"
 #include "ros/bag_input.hpp"
 #include "synthetic/synthetic_room.hpp"
@@ -62,6 +65,25 @@ class RoundTrip : public BagTest {
     EXPECT_EQ(read.intrinsics.height, written.intrinsics.height);
   }
 };
+
+TEST_F(RoundTrip, AFullDiskIsASentenceAndLeavesNoBag) {
+  std::ofstream(path_) << "an earlier bag";
+  std::signal(SIGXFSZ, SIG_IGN);
+  for (const rlim_t size : {0, 1000, 5000, 20000, 60000}) {
+    RoomSource source(room_frames());
+    std::string said;
+    limit_file_size(true, size);
+    try {
+      write_bag(source, path_);
+    } catch (const FileError& error) {
+      said = error.what();
+    }
+    limit_file_size(false);
+    EXPECT_NE(said.find("has space"), std::string::npos) << "at " << size << " bytes: " << said;
+    EXPECT_FALSE(fs::exists(path_ + ".active"));
+    EXPECT_EQ(fs::file_size(path_), 14u) << "the earlier bag is gone";
+  }
+}
 
 TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   const std::vector<RecordedFrame> written = room_frames();

@@ -121,6 +121,10 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 
   CompressedDepthHeader header;
   std::memcpy(&header, message.data.data(), sizeof(header));
+  const auto [a, b] = header.quantisation;
+  if (!std::isfinite(a) || !std::isfinite(b) || a == 0)
+    throw BadFrame("its depth quantisation (" + std::to_string(a) + ", " + std::to_string(b) +
+                   ") is not valid: record it again with compressed_depth_image_transport, or record raw images");
   return metres_from_inverse(values, header.quantisation);
 }
 
@@ -173,17 +177,35 @@ cv::Mat copy(const ColorImage& image) {
   return bgr;
 }
 
+namespace {
+
+/// All values 0 mean the whole sensor, whose size may be unknown. @throws BadFrame
+void check_region(const sensor_msgs::CameraInfo& info) {
+  const sensor_msgs::RegionOfInterest& roi = info.roi;
+  const bool is_whole = roi.x_offset == 0 && roi.y_offset == 0 && roi.width == 0 && roi.height == 0;
+  if (is_whole || info.width == 0 || info.height == 0) return;
+  const std::uint64_t right = std::uint64_t{roi.x_offset} + roi.width, bottom = std::uint64_t{roi.y_offset} + roi.height;
+  if (roi.width > 0 && roi.height > 0 && right <= info.width && bottom <= info.height) return;
+  throw BadFrame("the region of interest in its camera_info, " + std::to_string(roi.width) + "x" + std::to_string(roi.height) +
+                 " pixels at (" + std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) + "), is not within the sensor of " +
+                 std::to_string(info.width) + "x" + std::to_string(info.height) + " pixels: correct it in the camera's driver");
+}
+
+}  // namespace
+
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {
+  check_region(info);
   sensor_msgs::CameraInfo rectified = info;
   if (info.P[0] == 0) rectified.P = {info.K[0], 0, info.K[2], 0, 0, info.K[4], info.K[5], 0, 0, 0, 1, 0};
-  image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
+  Intrinsics intrinsics;
   try {
+    image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
     model.fromCameraInfo(rectified);
+    const cv::Size size = model.reducedResolution();
+    intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   } catch (const std::exception& error) {
     throw BadFrame("its camera_info cannot be used (" + std::string(error.what()) + ")");
   }
-  const cv::Size size = model.reducedResolution();
-  const Intrinsics intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy}) {
     if (!std::isfinite(number)) throw BadFrame("its camera_info is not finite");
   }

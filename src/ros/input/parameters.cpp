@@ -102,6 +102,8 @@ std::vector<std::string> NodeConfig::problems() const {
     faults.push_back("world_frame is empty: it must be the tf frame in which the map does not move.");
   if (on_time_jump != "keep" && on_time_jump != "reset")
     faults.push_back("on_time_jump is '" + on_time_jump + "': it must be keep or reset.");
+  if (use_color && color_transport == "compressedDepth")
+    faults.push_back("color_transport is compressedDepth, which is for depth images: choose raw or compressed.");
   if (cloud_confidence != "frontier" && cloud_confidence != "occupied")
     faults.push_back("cloud_confidence is '" + cloud_confidence + "': it must be frontier or occupied.");
   return faults;
@@ -123,6 +125,12 @@ NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>*
     if (warnings != nullptr) warnings->push_back("There is no parameter ~" + entry.first + suggestion(entry.first, names));
   }
   return config;
+}
+
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config) {
+  const auto write = [&pnh](const FieldInfo& info, const auto& value) { pnh.setParam(info.name, value); };
+  for_each_field(config.mapper, write);
+  for_each_node_field(config, write);
 }
 
 Config read_mapper_config(const std::string& node) {
