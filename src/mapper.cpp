@@ -10,6 +10,7 @@
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/paths.hpp"
+#include "map/change_readers.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "stages/candidates.hpp"
@@ -77,6 +78,7 @@ struct Mapper::Impl {
   void finish_pages(std::uint32_t number);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(Report& report);
+  Changes changes(std::uint64_t since);
   void begin_map(const std::vector<Surfel>& surfels);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
 
@@ -99,6 +101,7 @@ struct Mapper::Impl {
   Creation creation;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
+  ChangeReaders readers;
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
   std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of a frame that failed half way; 0: none
@@ -173,6 +176,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   commands.forget_times();  // a frame that failed half way has left some
   frame_on_device = 0;
+  if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
   if (unfinished != 0) {  // the failed frame may have split surfels, or marked some as changed
     pages_changed = true;
     finish_pages(unfinished);
@@ -231,10 +235,17 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 }
 
 Changes Mapper::changes(std::uint64_t since) const {
+  return on_device([&] { return impl_->changes(since); });
+}
+
+Changes Mapper::Impl::changes(std::uint64_t since) {
+  const bool given_again = since != 0 && !readers.knows(since);
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
-  const bool last_frame = impl_->frame_on_device == impl_->sequence && since + 1 == impl_->sequence;
-  Changes changes = on_device([&] { return last_frame ? impl_->map.last_changes() : impl_->map.changes(since); });
-  changes.sequence = impl_->sequence;
+  const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
+  Changes changes = last_frame ? map.last_changes() : map.changes(since, given_again);
+  changes.sequence = sequence;
+  readers.note(since, sequence);
+  map.reserve_ids(readers.slowest());
   return changes;
 }
 

@@ -80,7 +80,9 @@ TEST_F(MapperChanges, LeadFromAnyEarlierMapToThisOne) {
     EXPECT_EQ(follower.sequence(), mapper_.sequence());
 
     for (const Surfel& surfel : changes.updated) ASSERT_NE(find(maps_.back(), surfel.id), nullptr) << surfel.id;
-    for (const std::uint32_t id : changes.removed) ASSERT_EQ(find(maps_.back(), id), nullptr) << id << " is still in the map";
+    std::size_t both = 0;  // the fixture's reader alone is known, and it has the last map
+    for (const std::uint32_t id : changes.removed) both += find(maps_.back(), id) != nullptr;
+    EXPECT_EQ(both > 0, since > 0 && since + 1 < maps_.size());
     std::set<std::uint32_t> ids(changes.removed.begin(), changes.removed.end());
     EXPECT_EQ(ids.size(), changes.removed.size()) << "an id is reported twice";
   }
@@ -98,6 +100,7 @@ TEST_F(MapperChanges, NothingSinceNowOrLater) {
 /// The changes of the last frame contain what it has changed, and no more.
 TEST(MapperChange, OfTheLastFrameIsExact) {
   Mapper mapper(undecimated());
+  mapper.changes(0);  // a reader, whose ids are kept
   integrate_all(mapper, orbit_frames(coarse_camera(), 4, 5));
   const Map before = mapper.surfels();
   const Report report = mapper.integrate(orbit_frames(coarse_camera(), 5, 5).back().view());
@@ -105,7 +108,10 @@ TEST(MapperChange, OfTheLastFrameIsExact) {
   std::size_t added = 0, changed = 0, unchanged = 0;
   for (const Surfel& surfel : changes.updated) {
     const Surfel* old = find(before, surfel.id);
-    ++(old == nullptr || old->position != surfel.position ? added : same(*old, surfel) ? unchanged : changed);
+    ++(old == nullptr ? added : same(*old, surfel) ? unchanged : changed);
+    if (old != nullptr) {
+      EXPECT_EQ(old->position, surfel.position) << "an id is given again";
+    }
   }
   EXPECT_EQ(added, report.created);
   EXPECT_EQ(unchanged, 0u);
@@ -113,13 +119,11 @@ TEST(MapperChange, OfTheLastFrameIsExact) {
   EXPECT_LT(changes.updated.size(), before.size());
   EXPECT_EQ(before.size() + report.created - report.removed, report.surfels);
 
-  std::set<std::uint32_t> old_ids, reused;
+  std::set<std::uint32_t> old_ids;
   for (const Surfel& surfel : before) old_ids.insert(surfel.id);
   for (const std::uint32_t id : changes.removed) EXPECT_EQ(old_ids.count(id), 1u) << id << " was not in the map";
-  for (const Surfel& surfel : changes.updated)
-    if (old_ids.count(surfel.id) && find(before, surfel.id)->position != surfel.position) reused.insert(surfel.id);
-  EXPECT_GT(reused.size(), 0u) << "freed ids are used again";
-  EXPECT_EQ(changes.removed.size() + reused.size(), report.removed);
+  EXPECT_GT(report.removed, 0u);
+  EXPECT_EQ(changes.removed.size(), report.removed);
 }
 
 /// Number of surfels made by splitting the parent once: with half its radius r, and r / 2 away from its centre.

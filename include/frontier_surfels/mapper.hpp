@@ -45,6 +45,11 @@ class Mapper {
   /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact. Those of earlier
   /// frames may also contain unchanged surfels near changed ones, and ids that were free before. Surfels that move to the map folder are
   /// reported as removed, and as updated with new ids when they come back.
+  ///
+  /// Any number of readers may follow the map: each begins with since = 0, and then gives the sequence number of its last Changes. Until a
+  /// reader has been told that a surfel is gone, its id is not given again, be it by frames, reset or load. A reader that has not asked for
+  /// 1000 frames is forgotten, and so is one that begins with another number: of those pages of the map that have changed, it gets all ids
+  /// as removed, and then all surfels.
   Changes changes(std::uint64_t since) const;
 
   /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. With

@@ -88,7 +88,7 @@ struct Surfel {
   float radius = 0;                                    ///< [m]
   Label label = Label::kFrontier;
   std::array<std::uint8_t, 3> rgb = {0, 0, 0};  ///< (0, 0, 0) when no colour was seen
-  std::uint32_t id = 0;                         ///< never changes; reused only after the surfel's removal was reported
+  std::uint32_t id = 0;                         ///< never changes; given to another surfel only after this one's removal was reported
 };
 
 /// Points that decide whether a surfel is right, as distances from its centre in radii: space should be unknown kBackProbe behind it,
@@ -97,11 +97,12 @@ struct Surfel {
 constexpr double kBackProbe = 0.25;
 constexpr double kFrontProbe = 1.75;
 
-/// Difference between the map at an earlier sequence number and the map now.
+/// Difference between the map at an earlier sequence number and the map now: first remove, then update.
 struct Changes {
   std::uint64_t sequence = 0;          ///< of the map now
   std::vector<Surfel> updated;         ///< new or changed surfels
-  std::vector<std::uint32_t> removed;  ///< ids that are no longer in the map
+  std::vector<std::uint32_t> removed;  ///< ids whose surfels are gone. An id that is updated as well belongs to another surfel now, which
+                                       ///< happens only to readers whom Mapper::changes() does not know
 };
 
 /// Wall or device time of one stage of the pipeline.

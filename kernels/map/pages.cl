@@ -2,6 +2,8 @@
 //
 // New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: this does not
 // depend on the number of threads. For that they are sorted by cell (block of the window), and keep the list's order in each cell.
+//
+// taken[pages] has a bit for each slot that is not free. It is `alive`, or, while ids must not be given again at once, `reserved`.
 
 // One work item handles an entry of a list of bits in pages: it becomes a slot of the map.
 //   in  pages;   i/o list[count]: before: 64 n + bit for page pages[n]; after: slots
@@ -31,10 +33,10 @@ __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __g
 }
 
 // One work item handles a page: it counts its free slots.
-//   in  pages[count]: of the window, by cell;   out free_slots[count]
-__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global uint* free_slots) {
+//   in  pages[count]: of the window, by cell;  taken;   out free_slots[count]
+__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* taken, __global uint* free_slots) {
   const uint n = get_global_id(0);
-  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(alive[pages[n]]);
+  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(taken[pages[n]]);
 }
 
 // Pages that a block needs for new surfels in addition to its free slots.
@@ -57,7 +59,7 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
 
 // One work item does all of the above for few new surfels, where launches take longer than that.
 __kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
-                       __global const ulong* alive, __global const uint* cell_pages, const uint cells, __global uint* free_before,
+                       __global const ulong* taken, __global const uint* cell_pages, const uint cells, __global uint* free_before,
                        __global uint* cell_begin, __global uint* missing, __global uint* order) {
   if (get_global_id(0) > 0) return;
   for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
@@ -71,7 +73,7 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
   uint free_slots = 0;
   for (uint n = 0; n < page_count; ++n) {
     free_before[n] = free_slots;
-    free_slots += PAGE_SLOTS - (uint)popcount(alive[pages[n]]);
+    free_slots += PAGE_SLOTS - (uint)popcount(taken[pages[n]]);
   }
   free_before[page_count] = free_slots;
   for (uint cell = 0; cell < cells; ++cell)
@@ -82,28 +84,39 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
 // One work item handles a page of the window: its free slots take their share of the cell's new surfels.
 //   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
 //       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
-//   i/o page_block, alive, changed, surfels: the map
+//   i/o page_block, alive, changed, surfels: the map;  taken: may be the same buffer as `alive`
 __kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
                          __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
-                         __global uint4* surfels) {
+                         __global ulong* taken, __global uint4* surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1], known = count - new_count;
   const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
   uint at = cell_begin[cell] + before - free_before[cell_pages[cell]];
-  ulong taken = 0;
-  for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
+  const ulong before_this = n < known ? taken[page] : 0;  // added pages are free, whatever they have been before
+  ulong filled = 0;
+  for (ulong left = ~before_this; left != 0 && at < end; left &= left - 1, ++at) {
     const uint bit = (uint)lowest_bit(left);
     surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
-    taken |= 1ul << bit;
+    filled |= 1ul << bit;
   }
-  if (taken == 0) return;
+  if (filled == 0) return;
   const int3 place = (int3)(cell % window.size_x, cell / window.size_x % window.size_y, cell / window.size_x / window.size_y);
   page_block[page].xyz = (int3)(window.origin_x, window.origin_y, window.origin_z) + place;
-  alive[page] |= taken;
-  changed[page] |= taken;
+  alive[page] |= filled;
+  changed[page] |= filled;
+  taken[page] = before_this | filled;
+}
+
+// One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved, and those slots that a
+// failed frame has emptied.
+//   in  page_block, alive, changed;   i/o reserved[count]
+__kernel void reserve_slots(const uint count, __global const int4* page_block, __global const ulong* alive, __global const ulong* changed,
+                            const uint told, __global ulong* reserved) {
+  const uint page = get_global_id(0);
+  if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page] | changed[page];
 }
 
 // One work item handles a page of the window at the end of a frame.

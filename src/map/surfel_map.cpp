@@ -36,6 +36,7 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       surfels_(commands),
       alive_(commands),
       changed_(commands),
+      reserved_(commands),
       page_block_(commands),
       pages_list_(commands),
       page_cells_list_(commands),
@@ -65,6 +66,7 @@ void SurfelMap::grow(std::size_t pages) {
   surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
   grow_marks(alive_);
   grow_marks(changed_);
+  if (reserves_ids_) grow_marks(reserved_);
   page_block_.grow(pages, kept, spare);
 }
 
@@ -156,14 +158,14 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   order_.resize(count);
   if (commands_.device().prefers_one_item && count <= kMaxSortedAlone)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
-                  alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
+                  taken(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else
     sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
   add_pages(missing_.read(cell_count));
 
   commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
-                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), surfels_());
+                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), taken(), surfels_());
   size_ += count;
 }
 
@@ -175,7 +177,7 @@ void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cell
   commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), free_before_());
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, taken(), free_before_());
   lists_.prefix_sums(stage, free_before_, pages);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
                 missing_());
@@ -209,7 +211,7 @@ std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t f
   for (cl_uint n = 0; n < count; ++n) {
     if (!empty[n]) continue;
     const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
-    index_.remove_page(block, window_pages_[n]);
+    index_.remove_page(block, window_pages_[n], removal(frame));
     shrunk.push_back(block);
   }
   return shrunk;
@@ -272,7 +274,7 @@ std::vector<Surfel> SurfelMap::download() const {
   return surfels;
 }
 
-Changes SurfelMap::changes(std::uint64_t since) const {
+Changes SurfelMap::changes(std::uint64_t since, bool given_again) const {
   const auto blocks = page_block_.read(index_.end());
   std::vector<Page> pages;
   for (Page page = 0; page < blocks.size(); ++page)
@@ -280,18 +282,34 @@ Changes SurfelMap::changes(std::uint64_t since) const {
   Changes changes;
   visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
     for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
-    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+    for_each_bit(given_again ? ~cl_ulong{0} : ~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
   });
   return changes;
 }
 
-std::size_t SurfelMap::allocated_bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes(); }
+void SurfelMap::reserve_ids(std::optional<std::uint64_t> told) {
+  if (!told) {
+    reserves_ids_ = false;
+    index_.release(~std::uint64_t{0});
+    return;
+  }
+  const cl_uint frame = reserves_ids_ ? static_cast<cl_uint>(*told) : ~cl_uint{0};  // at first, all slots that are not alive are free
+  reserved_.allocate(alive_.size());
+  const auto pages = static_cast<cl_uint>(index_.end());
+  commands_.run("changes", "reserve_slots", pages, kGroup, pages, page_block_(), alive_(), changed_(), frame, reserved_());
+  reserves_ids_ = true;
+  index_.release(*told);
+}
+
+std::size_t SurfelMap::allocated_bytes() const {
+  return surfels_.bytes() + alive_.bytes() + changed_.bytes() + reserved_.bytes() + page_block_.bytes();
+}
 
 std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes(); }
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;
-  // Without `alive` and `changed`: these are filled with zeros, hence touched.
+  // Without `alive`, `changed` and `reserved`: these are filled with zeros, hence touched.
   constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);
   return surfels_.bytes() + page_block_.bytes() - kPage * index_.end();
 }

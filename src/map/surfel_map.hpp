@@ -1,9 +1,11 @@
 /// The map in device buffers: the world has blocks, a block has pages, a page has PAGE_SLOTS slots for surfels. A surfel's slot is its id.
+/// While someone follows the changes, slots of removed surfels are reserved until these readers know of the removal.
 /// kernels/common/surfels.cl describes the buffers.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,7 +61,12 @@ class SurfelMap {
   std::vector<Surfel> download() const;
 
   /// Content of the pages that changed after frame `since`: all their surfels as updated, all their empty slots as removed.
-  Changes changes(std::uint64_t since) const;
+  /// @param given_again  ids may have been given again after `since`: all slots of these pages are told as removed
+  Changes changes(std::uint64_t since, bool given_again = false) const;
+
+  /// From now on, no id is given again that a surfel has lost after frame `told`. To be called between frames. Without a number, ids are
+  /// given again at once, as at first.
+  void reserve_ids(std::optional<std::uint64_t> told);
 
   /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
@@ -96,6 +103,8 @@ class SurfelMap {
   void close_window();
   void add_pages(const std::vector<cl_uint>& missing);
   std::size_t allocated_bytes() const;
+  const cl::Buffer& taken() const { return reserves_ids_ ? reserved_() : alive_(); }      ///< slots that no new surfel may take
+  std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
   void sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
 
@@ -105,11 +114,13 @@ class SurfelMap {
   double largest_radius_;    ///< no surfel of the map is larger [m]
   const double thickness_;   ///< [voxel]
   std::size_t size_ = 0;
+  bool reserves_ids_ = false;
   BlockIndex index_;
 
   // Indexed by slot or page
   DeviceArray<cl_uint4> surfels_;
   DeviceArray<cl_ulong> alive_, changed_;
+  DeviceArray<cl_ulong> reserved_;  ///< alive ones, and those whose removal has not been told. Only with reserves_ids_
   DeviceArray<cl_int4> page_block_;
 
   // This frame's window: its pages, sorted by cell

@@ -122,16 +122,18 @@ TEST(MergedChanges, EqualTheTwoOneByOne) {
     EXPECT_EQ(both.sequence, later.sequence);
     EXPECT_TRUE(same(merged.surfels(), singly.surfels()));
 
-    std::set<std::uint32_t> ids(both.removed.begin(), both.removed.end());
-    for (const Surfel& surfel : both.updated) EXPECT_TRUE(ids.insert(surfel.id).second) << surfel.id << " is in it twice";
-    EXPECT_EQ(ids.size(), both.removed.size() + both.updated.size());
+    std::set<std::uint32_t> removed(both.removed.begin(), both.removed.end()), updated;
+    for (const Surfel& surfel : both.updated) EXPECT_TRUE(updated.insert(surfel.id).second) << surfel.id << " is updated twice";
+    EXPECT_EQ(removed.size(), both.removed.size()) << "an id is removed twice";
+    for (const Changes* one : {&earlier, &later})
+      for (const std::uint32_t id : one->removed) EXPECT_EQ(removed.count(id), 1U) << "nobody is told that " << id << " was removed";
   }
 }
 
-TEST(MergedChanges, TellOfASurfelThatWentAndCameBack) {
+TEST(MergedChanges, TellOfAnIdThatWasGivenAgain) {
   Rng rng(5);
   const Surfel a = random_surfel(rng, 1), b = random_surfel(rng, 1);
-  EXPECT_TRUE(merge({2, {}, {1}}, {3, {a}, {}}).removed.empty());
+  EXPECT_EQ(merge({2, {}, {1}}, {3, {a}, {}}).removed, std::vector<std::uint32_t>{1});
   EXPECT_TRUE(same(merge({2, {}, {1}}, {3, {a}, {}}).updated, {a}));
   EXPECT_TRUE(same(merge({2, {a}, {}}, {3, {b}, {}}).updated, {b}));
   EXPECT_TRUE(merge({2, {a}, {}}, {3, {}, {1}}).updated.empty());

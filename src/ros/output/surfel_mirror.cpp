@@ -111,14 +111,9 @@ Changes merge(Changes earlier, Changes later) {
   merged.updated.reserve(kept.size() + later.updated.size());
   std::set_union(later.updated.begin(), later.updated.end(), kept.begin(), kept.end(), std::back_inserter(merged.updated), by_id);
 
-  std::vector<std::uint32_t> removed;
-  removed.reserve(earlier.removed.size() + later.removed.size());
-  std::set_union(earlier.removed.begin(), earlier.removed.end(), later.removed.begin(), later.removed.end(), std::back_inserter(removed));
-  auto surfel = merged.updated.begin();
-  for (const std::uint32_t id : removed) {
-    while (surfel != merged.updated.end() && surfel->id < id) ++surfel;
-    if (surfel == merged.updated.end() || surfel->id != id) merged.removed.push_back(id);
-  }
+  merged.removed.reserve(earlier.removed.size() + later.removed.size());
+  std::set_union(earlier.removed.begin(), earlier.removed.end(), later.removed.begin(), later.removed.end(),
+                 std::back_inserter(merged.removed));
   return merged;
 }
 

@@ -51,7 +51,8 @@ class SurfelMirror {
   std::vector<Surfel> slots_;
 };
 
-/// Two changes that follow each other as one. If both name a surfel, the later ones count. Surfels and ids are ordered.
+/// Two changes that follow each other as one. If both name a surfel, the later ones count. An id that was removed and then given to another
+/// surfel is both removed and updated. Surfels and ids are ordered.
 Changes merge(Changes earlier, Changes later);
 
 }  // namespace frontier_surfels
