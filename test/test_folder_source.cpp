@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -363,44 +362,6 @@ TEST_F(TumFolderTest, KnowsTheBenchmarksCamerasByName) {
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->intrinsics.fx, camera.fx);
   }
-}
-
-/// A recorded sequence, and some of its pixels.
-fs::path recorded(const std::string& name) {
-  const char* wanted = std::getenv("FRONTIER_SURFELS_DATA");
-  return fs::path(wanted ? wanted : FRONTIER_SURFELS_DATA_DIR) / name;
-}
-
-struct Expected {
-  std::size_t frames;
-  double last_stamp;
-  Eigen::Vector3d first_position;
-  int first_pixel, last_pixel;  ///< row 240, column 320 [mm]
-  bool color;
-};
-
-void expect_recorded(const fs::path& folder, const Expected& expected) {
-  const auto source = open_source(folder.string());
-  EXPECT_EQ(source->size(), expected.frames);
-  const std::vector<RecordedFrame> frames = read_all(*source);
-  ASSERT_EQ(frames.size(), expected.frames);
-  EXPECT_NEAR(frames.back().stamp, expected.last_stamp, 1e-6);
-  EXPECT_EQ(frames.front().T_world_camera.translation(), expected.first_position);
-  EXPECT_EQ(frames.front().depth.at<std::uint16_t>(240, 320), expected.first_pixel);
-  EXPECT_EQ(frames.back().depth.at<std::uint16_t>(240, 320), expected.last_pixel);
-  EXPECT_EQ(!frames.front().color.empty(), expected.color);
-}
-
-TEST(RecordedSequences, SevenScenesRedKitchen) {
-  const fs::path folder = recorded("7scenes_redkitchen");
-  if (!fs::exists(folder)) GTEST_SKIP() << "There is no " << folder << ": set FRONTIER_SURFELS_DATA to the folder of recorded sequences.";
-  expect_recorded(folder, {200, 33.166667, {-0.3404563, 0.0164698, 0.2965692}, 1382, 1549, false});
-}
-
-TEST(RecordedSequences, TumFr1Xyz) {
-  const fs::path folder = recorded("tum_fr1_xyz");
-  if (!fs::exists(folder)) GTEST_SKIP() << "There is no " << folder << ": set FRONTIER_SURFELS_DATA to the folder of recorded sequences.";
-  expect_recorded(folder, {199, 1305031128.655554, {1.3452, 0.6273, 1.6627}, 1057, 854, true});
 }
 
 }  // namespace
