@@ -10,7 +10,8 @@ from test_updates import Follower
 
 
 class InParts(MapperTest):
-    """A mapper whose messages have at most 1000 surfels each, which is less than its map has."""
+    """A mapper whose messages have at most 5000 surfels each, which is less than its map has. Smaller messages would be too many for the queue
+    of a slow subscriber."""
 
     def test_updates(self):
         follower = Follower(self.mapper)
@@ -22,7 +23,7 @@ class InParts(MapperTest):
             self.assertEqual(follower.faults, [])
         self.assertGreater(follower.most_parts, 2)
         self.assertEqual(follower.gaps, 0)
-        surfels = numpy.concatenate(list(self.mapper.parts(500)))
+        surfels = numpy.concatenate(list(self.mapper.parts(3000)))
         self.assertEqual(follower.bytes(), surfels.tobytes())
 
     def test_a_late_subscriber_gets_the_whole_map(self):
@@ -41,7 +42,7 @@ class InParts(MapperTest):
 
     def test_get_surfels_in_parts(self):
         report = self.map_walk(2)
-        for most, largest in ((300, 300), (5000, 1000)):
+        for most, largest in ((3000, 3000), (20000, 5000)):
             parts = list(self.mapper.parts(most))
             self.assertEqual({len(part) for part in parts[:-1]}, {largest})
             ids = numpy.concatenate(parts)['id']
