@@ -121,7 +121,7 @@ void expect_sentences(int inputs, Read read) {
 /// Lets the program have 64 MB more than now, or lifts the limit. Damaged sizes then end in std::bad_alloc, as they do where memory is
 /// short.
 inline void limit_memory([[maybe_unused]] bool limited) {
-#ifndef __SANITIZE_ADDRESS__  // AddressSanitizer ends the program where others get std::bad_alloc
+#ifndef __SANITIZE_ADDRESS__                  // AddressSanitizer ends the program where others get std::bad_alloc
   constexpr rlim_t kMore = rlim_t{64} << 20;  // [byte]
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;

@@ -42,9 +42,9 @@ const char* result_name(std::uint8_t result) {
 void MappingStatus::add(const FrameReport& report, Clock::time_point now) {
   ++counts_[report.result];
   if (report.result == FrameReport::INTEGRATED) {
-    mapped_.emplace_back(now, report.total_ms);
+    mapped_.push_back({now, report.total_ms, report.reason});
     mapped_since_ = true;
-    while (now - mapped_.front().first > kWindow) mapped_.pop_front();
+    while (now - mapped_.front().time > kWindow) mapped_.pop_front();
   } else if (report.result == FrameReport::FAILED) {
     failed_ = now;
     failure_ = report.reason;
@@ -55,10 +55,10 @@ void MappingStatus::add(const FrameReport& report, Clock::time_point now) {
 }
 
 void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now) {
-  while (!mapped_.empty() && now - mapped_.front().first > kWindow) mapped_.pop_front();
+  while (!mapped_.empty() && now - mapped_.front().time > kWindow) mapped_.pop_front();
   summarize(status, now);
   std::vector<double> times;
-  for (const auto& frame : mapped_) times.push_back(frame.second);
+  for (const MappedFrame& frame : mapped_) times.push_back(frame.total_ms);
   status.addf("rate [Hz]", "%.1f", static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count());
   status.addf("time a frame, median [ms]", "%.1f", median(times));
   status.addf("time a frame, longest [ms]", "%.1f", times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()));
@@ -81,6 +81,8 @@ void MappingStatus::summarize(diagnostic_updater::DiagnosticStatusWrapper& statu
     status.summary(DiagnosticStatus::WARN, "no depth image has come on " + depth_topic_);
   } else if (mapped_.empty()) {
     status.summary(DiagnosticStatus::WARN, last_reason_.empty() ? "no depth image has come lately" : last_reason_);
+  } else if (std::none_of(mapped_.begin(), mapped_.end(), [](const MappedFrame& frame) { return frame.remark.empty(); })) {
+    status.summary(DiagnosticStatus::WARN, mapped_.back().remark);
   } else {
     status.summary(DiagnosticStatus::OK, "mapping");
   }
