@@ -97,6 +97,9 @@ struct Surfel {
 constexpr double kBackProbe = 0.25;
 constexpr double kFrontProbe = 1.75;
 
+/// Radius of a new surfel, half the diagonal of its voxel [voxel]: sqrt(3) / 2.
+constexpr double kNewRadius = 0.86602540378443865;
+
 /// Difference between the map at an earlier sequence number and the map now: first remove, then update.
 struct Changes {
   std::uint64_t sequence = 0;          ///< of the map now

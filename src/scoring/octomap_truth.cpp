@@ -149,7 +149,7 @@ std::vector<Surfel> OctomapTruth::boundary() const {
     for (int axis = 0; axis < 3; ++axis)
       surfel.position[axis] = static_cast<float>(tree.keyToCoord(static_cast<octomap::key_type>(v[axis])));
     surfel.normal = normal_at(tree, v);
-    surfel.radius = static_cast<float>(std::sqrt(3.0) / 2 * tree.getResolution());
+    surfel.radius = static_cast<float>(kNewRadius * tree.getResolution());
     surfel.label = unknown[i] & 1 ? Label::kOccupied : Label::kFrontier;
     surfel.id = static_cast<std::uint32_t>(surfels.size());
     surfels.push_back(surfel);
