@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "config/c_locale.hpp"
+
 namespace frontier_surfels::replay {
 namespace {
 
@@ -12,6 +14,7 @@ constexpr double kStillRotation = 1e-4;  // largest difference of a rotation mat
 constexpr float kMillimetresFrom = 100;  // [m]; depths in metres that are larger are probably millimetres
 
 std::string number(double value) {
+  const CLocale c_locale;
   char text[40];
   std::snprintf(text, sizeof(text), "%.3g", value);
   return text;

@@ -21,6 +21,7 @@
 #include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
+#include "ros/input/number_text.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
@@ -230,8 +231,8 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
 /// Time has jumped back, for all cameras: an image of another one must not reset the map once more.
 void MapperRos::Impl::start_again(const ros::Time& from, const ros::Time& to) {
   const bool reset = config_.on_time_jump == "reset";
-  ROS_WARN("Time has jumped back by %.1f s: old transforms are forgotten, and the map is %s (~on_time_jump).", messages::seconds(to, from),
-           reset ? "reset" : "kept");
+  ROS_WARN("Time has jumped back by %s s: old transforms are forgotten, and the map is %s (~on_time_jump).",
+           fixed_text(messages::seconds(to, from), 1).c_str(), reset ? "reset" : "kept");
   if (reset) mapper_.reset();
   for (const auto& camera : cameras_) camera->set_last_mapped(std::min(camera->last_mapped(), to));
 }

@@ -9,11 +9,11 @@
 #include <zlib.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <mutex>
 
+#include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -76,11 +76,7 @@ void create_tables(SQLite::Database& database, double block_size) {
   transaction.commit();
 }
 
-std::string in_metres(double length) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g m", length);
-  return text;
-}
+std::string in_metres(double length) { return to_text(length) + " m"; }
 
 void check_tables(const SQLite::Database& database, const std::string& folder, double block_size) {
   if (number(database, "PRAGMA application_id") != kApplication) {

@@ -1,9 +1,9 @@
 #include "ros/input/frame_remarks.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "frontier_surfels/depth_census.hpp"
+#include "ros/input/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -13,11 +13,7 @@ constexpr double kStillRotation = 1e-4;       // largest difference of a rotatio
 constexpr float kMillimetresFrom = 100;       // [m]; depths in metres that are larger are probably millimetres
 constexpr std::size_t kAlternatingSizes = 4;  // a camera whose mode is changed to and fro has fewer
 
-std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
+std::string number(double value) { return rounded_text(value, 3); }
 
 std::string size_text(const std::pair<int, int>& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
 

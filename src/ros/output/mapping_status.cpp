@@ -4,6 +4,8 @@
 #include <numeric>
 #include <vector>
 
+#include "ros/input/number_text.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -59,14 +61,15 @@ void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Cl
   summarize(status, now);
   std::vector<double> times;
   for (const auto& frame : mapped_) times.push_back(frame.second);
-  status.addf("rate [Hz]", "%.1f", static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count());
-  status.addf("time a frame, median [ms]", "%.1f", median(times));
-  status.addf("time a frame, longest [ms]", "%.1f", times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()));
-  for (std::uint8_t result = 0; result < kResults; ++result) status.add(std::string("frames ") + result_name(result), counts_[result]);
+  status.add("rate [Hz]", fixed_text(static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count(), 1));
+  status.add("time a frame, median [ms]", fixed_text(median(times), 1));
+  status.add("time a frame, longest [ms]", fixed_text(times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()), 1));
+  for (std::uint8_t result = 0; result < kResults; ++result)
+    status.add(std::string("frames ") + result_name(result), std::to_string(counts_[result]));
   if (counts_[FrameReport::FAILED] > 0) status.add("last failure", failure_);
-  status.add("surfels", map_.surfels);
-  status.addf("memory of the map [MB]", "%.1f", static_cast<double>(map_.map_bytes) / 1e6);
-  status.addf("memory on the device [MB]", "%.1f", static_cast<double>(map_.device_bytes) / 1e6);
+  status.add("surfels", std::to_string(map_.surfels));
+  status.add("memory of the map [MB]", fixed_text(static_cast<double>(map_.map_bytes) / 1e6, 1));
+  status.add("memory on the device [MB]", fixed_text(static_cast<double>(map_.device_bytes) / 1e6, 1));
   status.add("device", device_);
 }
 
