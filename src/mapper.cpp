@@ -259,6 +259,12 @@ std::vector<Surfel> Mapper::whole_map() const {
 
 void Mapper::save(const std::string& path) const { write_map(path, whole_map()); }
 
+void Mapper::flush() {
+  if (impl_->archive) on_device([&] { impl_->archive->flush(static_cast<std::uint32_t>(impl_->sequence)); });
+}
+
+std::string Mapper::map_folder_fault() const { return impl_->archive ? impl_->archive->fault() : ""; }
+
 void Mapper::load(const std::string& path) {
   const std::vector<Surfel> surfels = read_map(path);
   try {

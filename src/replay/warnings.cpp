@@ -88,6 +88,7 @@ std::vector<std::string> warnings(const Run& run) {
   if (is_still(run.frames))
     all.push_back("The camera never moves: all " + std::to_string(run.frames.size()) + " frames have the same pose in the frame '" +
                   run.world_frame + "'" + (run.if_still.empty() ? "" : "; if it did move, " + run.if_still) + ".");
+  if (!run.unsaved.empty()) all.push_back(run.unsaved);
   return all;
 }
 

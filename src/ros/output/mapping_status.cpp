@@ -56,6 +56,12 @@ void MappingStatus::add(const FrameReport& report, Clock::time_point now) {
   }
 }
 
+void MappingStatus::set_map_folder_fault(const std::string& fault) {
+  const bool over = fault.empty() && !map_folder_fault_.empty();
+  if (over && failure_ == map_folder_fault_) mapped_since_ = true;  // or it would stay an error until the next frame
+  map_folder_fault_ = fault;
+}
+
 void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now) {
   while (!mapped_.empty() && now - mapped_.front().first > kWindow) mapped_.pop_front();
   summarize(status, now);
@@ -78,6 +84,8 @@ void MappingStatus::summarize(diagnostic_updater::DiagnosticStatusWrapper& statu
   const std::uint64_t all = std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0});
   if (counts_[FrameReport::FAILED] > 0 && (!mapped_since_ || now - failed_ <= kWindow)) {
     status.summary(DiagnosticStatus::ERROR, failure_);
+  } else if (!map_folder_fault_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, map_folder_fault_);
   } else if (paused_) {
     status.summary(DiagnosticStatus::OK, "paused");
   } else if (all == 0) {
