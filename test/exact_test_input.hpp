@@ -36,7 +36,7 @@ struct OwnedFrame {
     bytes.assign(frame.depth.step * camera.height, 0xA5);
   }
 
-  static std::size_t pixel_size(Encoding encoding) { return encoding == Encoding::kMillimetresU16 ? 2 : 4; }
+  static std::size_t pixel_size(Encoding encoding) { return encoding == Encoding::kStepsU16 ? 2 : 4; }
 
   void set(int column, int row, double metres) {
     const std::size_t size = pixel_size(frame.depth.encoding);

@@ -26,7 +26,7 @@ const Vector3d kSideInward(1, 0, kSide);            // normal of the left side, 
 const Vector3d kTowards(0, 0, -1), kAway(0, 0, 1);  // towards the camera, away from it
 
 ExactTest step_scene() {
-  OwnedFrame frame({100, 100, 79.5, 59.5, 160, 120}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 6, false);
+  OwnedFrame frame({100, 100, 79.5, 59.5, 160, 120}, Eigen::Isometry3d::Identity(), Encoding::kStepsU16, 6, false);
   for (int t = 0; t < 120; ++t) {
     for (int s = 0; s < 160; ++s) frame.set(s, t, s < 80 ? kLeft : kRight);
   }
@@ -128,7 +128,7 @@ TEST(ExactTest, CarvesWhatTheConfigurationSays) {
 }
 
 TEST(ExactTest, DecimatesLikeTheMapper) {
-  OwnedFrame frame({100, 80, 3, 5, 11, 14}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 3, true);
+  OwnedFrame frame({100, 80, 3, 5, 11, 14}, Eigen::Isometry3d::Identity(), Encoding::kStepsU16, 3, true);
   for (int t = 0; t < 14; t += 4) {
     for (int s = 0; s < 11; s += 4) frame.set(s, t, 1 + 0.1 * (s / 4) + 0.01 * (t / 4));
   }
@@ -227,7 +227,7 @@ std::size_t points_on_sheet(double thickness) {
   Eigen::Isometry3d facing(Eigen::Translation3d(0, 0, 2 + thickness));
   facing.rotate(Eigen::AngleAxisd(M_PI, Vector3d::UnitY()));
   for (const Eigen::Isometry3d& pose : {Eigen::Isometry3d::Identity(), facing}) {
-    OwnedFrame frame({15, 15, 14.5, 14.5, 30, 30}, pose, Encoding::kMillimetresU16, 0, false);
+    OwnedFrame frame({15, 15, 14.5, 14.5, 30, 30}, pose, Encoding::kStepsU16, 0, false);
     for (int i = 0; i < 900; ++i) frame.set(i % 30, i / 30, 1);
     test.add(frame.view());
   }

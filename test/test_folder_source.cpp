@@ -121,7 +121,7 @@ TEST_F(FolderTest, ViewsTheImagesInPlace) {
   const DepthFrame view = frame->view();
   EXPECT_EQ(view.depth.data, frame->depth.data);
   EXPECT_EQ(view.depth.step, 8u);
-  EXPECT_EQ(view.depth.encoding, frontier_surfels::DepthImage::Encoding::kMillimetresU16);
+  EXPECT_EQ(view.depth.encoding, frontier_surfels::DepthImage::Encoding::kStepsU16);
   EXPECT_EQ(view.depth.width, 4);
   EXPECT_EQ(view.depth.height, 3);
   ASSERT_TRUE(view.color);

@@ -149,7 +149,7 @@ std::string refusal(Mapper& mapper, int width, int height, double f) {
   const std::uint16_t pixel = 1000;
   DepthFrame frame;
   frame.intrinsics = {f, f, width / 2.0, height / 2.0, width, height};
-  frame.depth = {width, height, std::size_t{2} * width, DepthImage::Encoding::kMillimetresU16, &pixel, false};
+  frame.depth = {width, height, std::size_t{2} * width, DepthImage::Encoding::kStepsU16, &pixel, false};
   frame.T_world_camera = Eigen::Isometry3d::Identity();
   return fault_of<BadFrame>([&] { mapper.integrate(frame); });
 }

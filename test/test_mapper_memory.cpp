@@ -18,6 +18,9 @@ std::string refusal(Mapper& mapper, const DepthFrame& frame) {
   return fault_of<Error>([&] { mapper.integrate(frame); });
 }
 
+/// Whether the device is one that was made small above.
+bool is_small(const Mapper& mapper) { return contains(mapper.device(), "Portable Computing Language"); }
+
 void expect_goes_on(Mapper& mapper, const std::vector<Surfel>& before, const Frames& frames) {
   EXPECT_TRUE(same(before, mapper.surfels()));
   for (const auto& frame : frames) EXPECT_NO_THROW(mapper.integrate(frame.view()));
@@ -33,7 +36,7 @@ TEST(MapperMemory, AGridTooLargeForTheDevice) {
   const auto before = mapper.surfels();
   const auto large = plane_frame(plain_camera(1400, 1400, 250), 1);
   const std::string said = refusal(mapper, large.view());
-  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  if (said.empty() && !is_small(mapper)) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
   EXPECT_TRUE(contains(said, "this device has room for")) << said;
   EXPECT_TRUE(contains(said, "Set decimation to 2")) << said;
   expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
@@ -49,7 +52,7 @@ TEST(MapperMemory, RecentViewsTooManyForTheDevice) {
   const auto before = mapper.surfels();
   const auto large = plane_frame(plain_camera(600, 600, 40), 1);
   const std::string said = refusal(mapper, large.view());
-  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  if (said.empty() && !is_small(mapper)) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
   EXPECT_TRUE(contains(said, "MiB")) << said;
   expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
 }

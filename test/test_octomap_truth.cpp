@@ -202,7 +202,7 @@ TEST(OctomapTruth, CarvesWhatTheConfigurationSays) {
 TEST(OctomapTruth, FrameWithoutMeasurementsAddsNothing) {
   for (const std::uint16_t nothing : {0, 65535}) {
     DepthFrame frame;
-    frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kMillimetresU16, &nothing, false};
+    frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kStepsU16, &nothing, false};
     frame.intrinsics = {10, 10, 0, 0, 1, 1};
     frame.T_world_camera = Eigen::Isometry3d::Identity();
     Config config = reading(0.5, 3, 1);
@@ -216,7 +216,7 @@ TEST(OctomapTruth, FrameWithoutMeasurementsAddsNothing) {
 TEST(OctomapTruth, SixteenBitsAreInTheConfiguredUnit) {
   const std::uint16_t steps = 4250;  // 0.85 m
   DepthFrame frame;
-  frame.depth = {1, 1, sizeof(steps), DepthImage::Encoding::kMillimetresU16, &steps, false};
+  frame.depth = {1, 1, sizeof(steps), DepthImage::Encoding::kStepsU16, &steps, false};
   frame.intrinsics = {10, 10, 0, 0, 1, 1};
   frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
   Config config = reading(0.5, 3, 1);

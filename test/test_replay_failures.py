@@ -164,8 +164,8 @@ class NothingUsable(unittest.TestCase):
     def test_depths(self):
         for reason, remedy, change in [('no_measurement', 'camera delivers depth', lambda depth: 0 * depth),
                                        ('saturated', 'camera and its driver', lambda depth: 0 * depth + 65535),
-                                       ('too_near', 'must be in millimetres', lambda depth: depth * 0 + 7),
-                                       ('too_far', 'must be in millimetres', lambda depth: depth * 0 + 60000)]:
+                                       ('too_near', 'correct depth_unit', lambda depth: depth * 0 + 7),
+                                       ('too_far', 'correct depth_unit', lambda depth: depth * 0 + 60000)]:
             with self.subTest(reason=reason):
                 self.change_depth(change)
                 result = self.run_room()

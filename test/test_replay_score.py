@@ -3,7 +3,9 @@
 
 usage: test_replay_score.py REPLAY_SCORE MAKE_SYNTHETIC
 """
+import base64
 import csv
+import io
 import json
 import os
 import re
@@ -72,7 +74,7 @@ class Usage(unittest.TestCase):
     def test_wrong_usage_prints_the_usage(self):
         there = [self.folder.name, '--report', self.report]
         wrong = ['another', '--no-such-option', '--first -1', '--first 5 --last 4', '--stride 0', '--threads many',
-                 '--octomap-resolution -1', '--octomap-resolution nan', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
+                 '--octomap-resolution -1', '--octomap-resolution nan', '--octomap-resolution automatic', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
         for arguments in [[], [self.folder.name], ['--report', self.report], *([*there, *text.split()] for text in wrong)]:
             with self.subTest(arguments=arguments):
                 self.check_refused(WRONG_USAGE, 'replay_score: .', arguments=arguments)
@@ -208,6 +210,28 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(kinds.count('data:image/png'), 4)  # map and OctoMap, from outside and inside
         self.assertEqual(kinds.count('data:image/svg+xml'), 3)  # time, size, sweep
         self.assertIn(f"{read_json(self.report)['surfels']['total']:,}".replace(',', '\u202f'), page)
+
+    def test_errors_have_a_colour_of_their_own(self):
+        with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+            pictures = re.findall(r'data:image/png;base64,([^"]+)', file.read())
+        share = []
+        for picture in pictures:
+            red, green, blue, _ = numpy.moveaxis(matplotlib.image.imread(io.BytesIO(base64.b64decode(picture))), 2, 0)
+            share.append(((red > green + 0.3) & (blue > green + 0.3)).mean())
+        wrong = 1 - read_json(self.report)['exact']['right']
+        self.assertGreater(wrong, 0.001)
+        self.assertGreater(share[0] + share[1], 0, 'the map has errors')
+        self.assertEqual(share[2:], [0, 0], "OctoMap's boundary is not judged")
+
+    def test_octomap_resolution_is_automatic_and_told(self):
+        report = os.path.join(self.folder.name, 'automatic')
+        result = run(self.room, '--report', report, '--set', 'decimation=8', '--no-exact', '--last', 2)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        octomap = read_json(report)['octomap']
+        with open(os.path.join(self.room, 'camera.txt'), encoding='utf-8') as file:
+            fx, fy = map(float, [line for line in file if not line.startswith('#')][0].split()[:2])
+        self.assertAlmostEqual(octomap['resolution'], 8 * 3 / min(fx, fy), places=9)
+        self.assertEqual(octomap['resolution'], octomap['pixel_spacing'])
 
     def test_what_is_switched_off_is_absent_and_old_files_are_removed(self):
         report = os.path.join(self.folder.name, 'reused')

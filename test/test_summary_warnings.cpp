@@ -17,7 +17,7 @@ DepthCensus census(const std::vector<Pixel>& pixels, const Config& config) {
   image.width = static_cast<int>(pixels.size());
   image.height = 1;
   image.step = sizeof(Pixel) * pixels.size();
-  image.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  image.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   image.data = pixels.data();
   return count_depths(image, config);
 }
@@ -61,13 +61,24 @@ TEST(DepthCensus, LooksAtThePixelsOfTheMapperInEitherByteOrder) {
   Config config = every_pixel();
   const std::vector<std::uint16_t> pixels = {0x0100, 7, 0x0200, 7, 7, 7, 7, 7};
   config.decimation = 2;
-  DepthImage image = {4, 1, 8, DepthImage::Encoding::kMillimetresU16, pixels.data(), false};
+  DepthImage image = {4, 1, 8, DepthImage::Encoding::kStepsU16, pixels.data(), false};
   EXPECT_EQ(count_depths(image, config).missing, 0u) << "the image has no whole block of 2 x 2 pixels";
   image.height = 2;
   image.swap_bytes = true;
   const DepthCensus swapped = count_depths(image, config);
   EXPECT_EQ(swapped.too_near, 2u);
   EXPECT_FLOAT_EQ(swapped.farthest, 0.002F);
+}
+
+TEST(DepthCensus, ReadsStepsOfTheConfiguredUnit) {
+  Config config = every_pixel();
+  config.depth_unit = 0.0001;
+  const DepthCensus depths = census<std::uint16_t>({10000, 60000}, config);
+  EXPECT_EQ(depths.usable, 1u);
+  EXPECT_FLOAT_EQ(depths.nearest, 1);
+  EXPECT_FLOAT_EQ(depths.farthest, 6);
+  EXPECT_NE(range_and_remedy(depths, config).find("from 1 to 6 m: 16-bit images are read in steps of depth_unit = 0.0001 m"),
+            std::string::npos);
 }
 
 /// A run of frames with these pixels, whose camera moves.
@@ -95,7 +106,7 @@ TEST(Warnings, NameTheCauseAndTheRemedy) {
   EXPECT_TRUE(warnings(run_of<std::uint16_t>({{1000}, {2000}})).empty());
   expect_warning(run_of<std::uint16_t>({{0}, {0}, {1000}}), {"2 of 3", "no measurement", "topic"});
   expect_warning(run_of<std::uint16_t>({{65535}}), {"1 of 1", "65535"});
-  expect_warning(run_of<std::uint16_t>({{60000}}), {"60 m", "must be in millimetres"});
+  expect_warning(run_of<std::uint16_t>({{60000}}), {"60 m", "correct depth_unit"});
   expect_warning(run_of<float>({{1500, 900}, {2500}}), {"2 of 2", "900 to 2.5e+03 m", "look like millimetres", "divide them by 1000"});
   expect_warning(run_of<float>({{0.001F}}), {"0.001 m", "must be in metres"});
 }

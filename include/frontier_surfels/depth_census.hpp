@@ -33,4 +33,10 @@ struct DepthCensus {
 /// @param image  with data and a valid size
 DepthCensus count_depths(const DepthImage& image, const Config& config);
 
+/// "z_min = 0.4 m to z_max = 3 m", for messages.
+std::string depth_range(const Config& config);
+
+/// End of a sentence about depths out of range, whose unit may be wrong: "from 20 to 60 m: 16-bit images are read in steps of ...".
+std::string range_and_remedy(const DepthCensus& depths, const Config& config);
+
 }  // namespace frontier_surfels

@@ -45,13 +45,13 @@ struct Intrinsics {
 /// A view of a depth image, depth[height][step / pixel size]: distance along the optical axis. Does not own the data.
 struct DepthImage {
   enum class Encoding {
-    kMillimetresU16,  ///< 16UC1, mono16, in steps of Config::depth_unit, by default [mm]: 0, 65535 = no measurement
-    kMetresF32,       ///< 32FC1: 0, NaN = no measurement, +Inf = no surface within the sensor's range (REP 118)
+    kStepsU16,   ///< 16UC1, mono16, in steps of Config::depth_unit, by default [mm]: 0, 65535 = no measurement
+    kMetresF32,  ///< 32FC1: 0, NaN = no measurement, +Inf = no surface within the sensor's range (REP 118)
   };
   int width = 0;
   int height = 0;
   std::size_t step = 0;  ///< [byte] from one row to the next
-  Encoding encoding = Encoding::kMillimetresU16;
+  Encoding encoding = Encoding::kStepsU16;
   const void* data = nullptr;
   bool swap_bytes = false;  ///< the data's endianness is not this machine's
 };

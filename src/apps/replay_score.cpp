@@ -1,6 +1,7 @@
 /// replay_score: maps a recording, scores the map, and writes a report.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <iterator>
@@ -30,7 +31,7 @@ struct Options {
   Recording recording;
   std::string report;  ///< folder of the report
   Config config;
-  double octomap_resolution = 0.01;  ///< voxel size [m]; 0: no OctoMap
+  OctomapResolution octomap_resolution;
   bool exact = true;
   std::optional<Sweep> sweep;
   std::optional<LiveOptions> live;
@@ -43,6 +44,7 @@ struct RawOptions {
   std::optional<int> threads;
   std::string sweep;
   std::string mapper;
+  std::string octomap_resolution = "auto";
   bool no_exact = false;
   bool live = false;
 };
@@ -76,8 +78,9 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's camera_info")->type_name("T");
   app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
   app.add_option("--world-frame", source.world_frame, "bags: tf frame of the map")->type_name("F");
-  app.add_option("--octomap-resolution", options.octomap_resolution,
-                 "voxel size [m] of the OctoMap that is built for comparison, default 0.01; 0: none")
+  app.add_option("--octomap-resolution", raw.octomap_resolution,
+                 "voxel size [m] of the OctoMap that is built for comparison; 0: none; default auto: the distance between pixels at z_max, "
+                 "where OctoMap has no gaps between rays")
       ->type_name("M");
   app.add_flag("--no-exact", raw.no_exact, "leave out the exact test");
   app.add_option("--threads", raw.threads, "number of threads of the mapper and the scores; 0: all")
@@ -113,6 +116,17 @@ void read_config(const RawOptions& raw, Config& config) {
   if (!problems.empty()) throw CLI::ValidationError("", problems);
 }
 
+/// @throws CLI::ValidationError
+OctomapResolution octomap_resolution(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  double resolution = NAN;
+  const bool is_number = CLI::detail::lexical_cast(text, resolution);
+  // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
+  if (!is_number || (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10)))
+    throw CLI::ValidationError("--octomap-resolution", "must be auto, 0, or from 0.0001 to 10 m");
+  return resolution;
+}
+
 /// @throws CLI::ValidationError if parameters of the mapper are given: a running mapper has its own
 LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& ros_arguments) {
   if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
@@ -145,10 +159,7 @@ Options parse(int argc, char** argv) {
     for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
-    // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
-    const double resolution = options.octomap_resolution;
-    if (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10))
-      throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
+    options.octomap_resolution = octomap_resolution(raw.octomap_resolution);
     read_config(raw, options.config);
     options.exact = !raw.no_exact;
     if (raw.live) options.live = live_options(raw, ros_arguments);
@@ -198,7 +209,7 @@ void replay_and_score(const Options& options) {
 
   const bool is_empty = run.surfels.empty();
   const Scores scores = is_empty ? Scores() : score(run.surfels, yardsticks, config.threads);
-  const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
+  const auto summary = summary_json(options.recording, run, yardsticks, scores);
   write_scores(folder.unfinished(), yardsticks, scores, summary);
   std::cout << result_table(summary) << std::flush;
 

@@ -3,17 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
+#include <cstdio>
+
+#include "config/c_locale.hpp"
+#include "frame/depth_pixels.hpp"
 
 namespace frontier_surfels {
 namespace {
 
-constexpr float kMetresPerUnit = 0.001F;  // of 16-bit images
-constexpr float kImplausible = 100;       // [m]; no depth camera measures as far, so that such a depth is in another unit
-constexpr std::uint16_t kSaturated = 65535;
+constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
-std::uint16_t swapped(std::uint16_t value) { return __builtin_bswap16(value); }
-std::uint32_t swapped(std::uint32_t value) { return __builtin_bswap32(value); }
+std::string number(double value) {
+  const CLocale c_locale;
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.3g", value);
+  return text;
+}
 
 void count_depth(float depth, const Config& config, DepthCensus& census) {
   if (std::isnan(depth) || depth <= 0) {
@@ -32,33 +37,15 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
   }
 }
 
-void count_pixel(std::uint16_t value, const Config& config, DepthCensus& census) {
-  if (value == kSaturated) {
-    ++census.saturated;
-  } else {
-    count_depth(static_cast<float>(value) * kMetresPerUnit, config, census);
-  }
-}
-
-void count_pixel(std::uint32_t bits, const Config& config, DepthCensus& census) {
-  float depth;
-  std::memcpy(&depth, &bits, sizeof(depth));
-  count_depth(depth, config, census);
-}
-
-/// @tparam Pixel  unsigned integer of the image's pixel size
 template <typename Pixel>
 void count_pixels(const DepthImage& image, const Config& config, DepthCensus& census) {
-  const std::size_t step = static_cast<std::size_t>(config.decimation);
-  const std::size_t width = static_cast<std::size_t>(image.width) / step, height = static_cast<std::size_t>(image.height) / step;
-  for (std::size_t t = 0; t < height; ++t) {
-    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * step * image.step;
-    for (std::size_t s = 0; s < width; ++s) {
-      Pixel pixel;
-      std::memcpy(&pixel, row + s * step * sizeof(Pixel), sizeof(Pixel));
-      count_pixel(image.swap_bytes ? swapped(pixel) : pixel, config, census);
+  for_each_pixel<Pixel>(image, config.decimation, [&](Pixel pixel) {
+    if (sizeof(Pixel) == 2 && pixel == kSaturated) {
+      ++census.saturated;
+    } else {
+      count_depth(to_metres(pixel, config.depth_unit), config, census);
     }
-  }
+  });
 }
 
 }  // namespace
@@ -82,6 +69,20 @@ DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   nearest = std::min(nearest, other.nearest);
   farthest = std::max(farthest, other.farthest);
   return *this;
+}
+
+std::string depth_range(const Config& config) { return "z_min = " + number(config.z_min) + " m to z_max = " + number(config.z_max) + " m"; }
+
+std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
+  std::string text = "from " + number(depths.nearest) + " to " + number(depths.farthest) + " m: ";
+  if (!depths.in_metres) {
+    text += "16-bit images are read in steps of depth_unit = " + number(config.depth_unit) + " m, so correct depth_unit";
+  } else if (depths.farthest >= kImplausible) {
+    return text + "32-bit images must be in metres, but these look like millimetres, so divide them by 1000, or use 16UC1.";
+  } else {
+    text += "32-bit images must be in metres, so correct their unit";
+  }
+  return text + ", or change z_min and z_max.";
 }
 
 DepthCensus count_depths(const DepthImage& image, const Config& config) {

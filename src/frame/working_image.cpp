@@ -1,11 +1,10 @@
 #include "frame/working_image.hpp"
 
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <string>
 
 #include "config/config_text.hpp"
+#include "frame/depth_pixels.hpp"
 #include "frame/view_grid.hpp"
 
 namespace frontier_surfels {
@@ -14,7 +13,7 @@ namespace {
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 void check_depth(const DepthImage& image, const Config& config) {
-  const std::size_t pixel = image.encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4;
+  const std::size_t pixel = image.encoding == DepthImage::Encoding::kStepsU16 ? 2 : 4;
   if (image.width < config.decimation || image.height < config.decimation)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
                    std::to_string(config.decimation) + "; lower decimation.");
@@ -56,19 +55,6 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
-/// Sensors write 0 or the largest number where they have measured nothing.
-float to_metres(std::uint16_t steps, bool swap_bytes, double depth_unit) {
-  if (swap_bytes) steps = __builtin_bswap16(steps);
-  return steps == std::numeric_limits<std::uint16_t>::max() ? 0 : static_cast<float>(steps * depth_unit);
-}
-
-float to_metres(std::uint32_t bits, bool swap_bytes, double) {
-  if (swap_bytes) bits = __builtin_bswap32(bits);
-  float metres;
-  std::memcpy(&metres, &bits, sizeof(metres));
-  return metres;
-}
-
 /// Meaning of a raw depth [m]: > 0 a surface at this depth, < 0 free space up to its magnitude, 0 no measurement.
 float interpret(float d, const Config& config) {
   const float z_max = static_cast<float>(config.z_max);
@@ -82,14 +68,8 @@ template <typename Pixel>
 std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
   std::vector<float> depth;
   depth.reserve(static_cast<std::size_t>(width) * height);
-  for (int t = 0; t < height; ++t) {
-    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * config.decimation * image.step;
-    for (int s = 0; s < width; ++s, row += config.decimation * sizeof(Pixel)) {
-      Pixel pixel;
-      std::memcpy(&pixel, row, sizeof(pixel));
-      depth.push_back(interpret(to_metres(pixel, image.swap_bytes, config.depth_unit), config));
-    }
-  }
+  for_each_pixel<Pixel>(image, config.decimation,
+                        [&](Pixel pixel) { depth.push_back(interpret(to_metres(pixel, config.depth_unit), config)); });
   return depth;
 }
 
@@ -120,9 +100,8 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config, d
   WorkingImage image;
   image.intrinsics = decimated(frame.intrinsics, config.decimation);
   const int width = image.intrinsics.width, height = image.intrinsics.height;
-  image.depth = frame.depth.encoding == DepthImage::Encoding::kMillimetresU16
-                    ? read_depth<std::uint16_t>(frame.depth, width, height, config)
-                    : read_depth<std::uint32_t>(frame.depth, width, height, config);
+  image.depth = frame.depth.encoding == DepthImage::Encoding::kStepsU16 ? read_depth<std::uint16_t>(frame.depth, width, height, config)
+                                                                        : read_depth<std::uint32_t>(frame.depth, width, height, config);
   if (frame.color) image.color = read_color(*frame.color, width, height, config.decimation);
   return image;
 }

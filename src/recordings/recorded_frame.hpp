@@ -31,7 +31,7 @@ inline DepthFrame RecordedFrame::view() const {
   frame.depth.width = depth.cols;
   frame.depth.height = depth.rows;
   frame.depth.step = depth.step[0];
-  frame.depth.encoding = depth.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  frame.depth.encoding = depth.type() == CV_16UC1 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   frame.depth.data = depth.data;
   if (color.empty()) return frame;
 

@@ -113,7 +113,8 @@ void BagLiveReplay::open_bag() {
   world = mapper_->world_frame();
   auto source = open_source(recording_.path, recording_.options);
   source_.reset(dynamic_cast<BagSource*>(source.get()));
-  if (source_) source.release();
+  if (!source_) throw Error("'" + recording_.path + "' is no bag: --live plays bags only.");
+  source.release();
 }
 
 void BagLiveReplay::tell_what_is_not_heard() {

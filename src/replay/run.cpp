@@ -15,14 +15,16 @@ constexpr std::size_t kSegments = 40000;  // of the exact test: the standard err
 
 }  // namespace
 
-Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
+Yardsticks::Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact)
+    : config_(config), octomap_resolution_(octomap_resolution) {
   if (exact) exact_.emplace(config);
-  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config);
 }
 
 std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
+  if (pixel_spacing_ == 0) pixel_spacing_ = config_.decimation * config_.z_max / std::min(frame.intrinsics.fx, frame.intrinsics.fy);
   if (exact_) exact_->add(frame);
-  if (!octomap_) return std::nullopt;
+  if (octomap_resolution() == 0) return std::nullopt;
+  if (!octomap_) octomap_.emplace(octomap_resolution(), config_);
   return octomap_->add(frame);
 }
 

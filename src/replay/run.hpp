@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/depth_census.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 #include "frontier_surfels/types.hpp"
 #include "recordings/frame_source.hpp"
-#include "replay/depth_census.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -22,17 +22,24 @@ struct Recording {
   SourceOptions options;
 };
 
+/// Side of OctoMap's voxels [m]; 0: no OctoMap; empty: automatic, as far apart as the pixels that are used at z_max, so that OctoMap has no
+/// gaps between rays.
+using OctomapResolution = std::optional<double>;
+
 /// What a map is scored against: the exact test and OctoMap. They must get the same frames as the map.
 class Yardsticks {
  public:
-  /// @param octomap_resolution  [m]; 0: no OctoMap
-  Yardsticks(const Config& config, double octomap_resolution, bool exact);
+  Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact);
 
   /// @return the time of OctoMap for this frame, if there is an OctoMap
   std::optional<scoring::InsertionTime> add(const DepthFrame& frame);
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
-  const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }
+  const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }  ///< empty before the first frame as well
+
+  double octomap_resolution() const { return octomap_resolution_.value_or(pixel_spacing_); }  ///< [m]; 0: none
+  /// Largest distance between neighbouring pixels at z_max, of the first frame [m].
+  double pixel_spacing() const { return pixel_spacing_; }
 
   /// OctoMap's boundary surfels M; computed once, after the last frame.
   const std::vector<Surfel>& octomap_boundary() const;
@@ -42,6 +49,8 @@ class Yardsticks {
 
  private:
   Config config_;
+  OctomapResolution octomap_resolution_;
+  double pixel_spacing_ = 0;
   std::optional<scoring::ExactTest> exact_;
   std::optional<scoring::OctomapTruth> octomap_;
   mutable std::optional<std::vector<Surfel>> octomap_boundary_;

@@ -50,7 +50,15 @@ double stage_ms(const FrameRecord& frame, const std::string& name) {
 
 double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
 
+double cpu_ms(const FrameRecord& frame) { return frame.cpu_ms; }
+
+bool cpu_is_measured(const std::vector<FrameRecord>& frames) {
+  return std::all_of(frames.begin(), frames.end(), [](const FrameRecord& frame) { return frame.cpu_ms > 0; });
+}
+
 double octomap_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->wall_ms : 0; }
+
+double octomap_cpu_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->cpu_ms : 0; }
 
 std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
   const CLocale c_locale;
@@ -127,8 +135,7 @@ ordered_json reasons_json(const std::vector<FrameRecord>& frames) {
   return counts;
 }
 
-ordered_json summary_json(const Recording& recording, double octomap_resolution, const Run& run, const Yardsticks& yardsticks,
-                          const Scores& scores) {
+ordered_json summary_json(const Recording& recording, const Run& run, const Yardsticks& yardsticks, const Scores& scores) {
   const std::vector<FrameRecord> warm = warm_frames(run.frames);
   ordered_json json;
   json["input"] = {{"path", recording.path}, {"frames", run.frames.size()}, {"skipped", run.skipped.size()}};
@@ -146,10 +153,13 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
                      {"frontier", run.statistics.frontier},
                      {"map_bytes", run.statistics.map_bytes}};
   json["time_ms"] = time_json(warm, stage_names(run.frames));
+  if (cpu_is_measured(warm)) json["cpu_ms"] = mean_and_median(column(warm, cpu_ms));
   json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
   if (scores.octomap) {
-    json["octomap"] = {{"resolution", octomap_resolution},
+    json["octomap"] = {{"resolution", yardsticks.octomap_resolution()},
+                       {"pixel_spacing", yardsticks.pixel_spacing()},
                        {"time_ms", mean_and_median(column(warm, octomap_ms))},
+                       {"cpu_ms", mean_and_median(column(warm, octomap_cpu_ms))},
                        {"memory_mb", yardsticks.octomap()->memory_mb()}};
     json["octomap"].update(octomap_json(*scores.octomap));
   }
@@ -213,8 +223,13 @@ std::string result_table(const ordered_json& summary) {
   }
   if (summary.contains("octomap")) {
     const auto& octomap = summary["octomap"];
-    table += formatted("OctoMap     median %.1f ms a frame, %.1f MB; FDR %.2f %%, FOR %.2f %% at 5 cm\n", octomap["time_ms"]["median"],
-                       octomap["memory_mb"], percent(octomap["fdr"]), percent(octomap["for"]));
+    table += formatted("OctoMap     voxels of %.1f mm, median %.1f ms a frame, %.1f MB; ", 1000 * octomap["resolution"].get<double>(),
+                       octomap["time_ms"]["median"], octomap["memory_mb"]);
+    table += formatted("FDR %.2f %%, FOR %.2f %% at 5 cm\n", percent(octomap["fdr"]), percent(octomap["for"]));
+    if (octomap["resolution"] < 0.999 * octomap["pixel_spacing"].get<double>()) {
+      table += formatted("            FOR counts OctoMap's own gaps: at z_max, pixels are %.1f mm apart\n",
+                         1000 * octomap["pixel_spacing"].get<double>());
+    }
   }
   for (const char* kind : {"warnings", "notes"}) {
     constexpr std::size_t kShown = 5;

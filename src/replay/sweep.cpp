@@ -106,8 +106,8 @@ Sweep parse_sweep(const std::string& text, const Config& base) {
   return sweep;
 }
 
-ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks, double octomap_resolution,
-                       const std::function<bool()>& stop) {
+ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks,
+                       const OctomapResolution& octomap_resolution, const std::function<bool()>& stop) {
   ordered_json values = ordered_json::array();
   for (const Config& config : sweep.configs) {
     if (stop()) break;

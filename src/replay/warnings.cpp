@@ -11,23 +11,12 @@ namespace {
 constexpr double kFewUsable = 0.05;      // share of the measured depths
 constexpr double kStillDistance = 1e-4;  // [m], below the noise of any tracked pose
 constexpr double kStillRotation = 1e-4;  // largest difference of a rotation matrix' elements
-constexpr float kMillimetresFrom = 100;  // [m]; depths in metres that are larger are probably millimetres
 
 std::string number(double value) {
   const CLocale c_locale;
   char text[40];
   std::snprintf(text, sizeof(text), "%.3g", value);
   return text;
-}
-
-std::string depth_range(const Config& config) { return "z_min = " + number(config.z_min) + " m to z_max = " + number(config.z_max) + " m"; }
-
-/// What to do about depths out of range, whose unit may be wrong.
-std::string unit_remedy(const DepthCensus& depths) {
-  if (!depths.in_metres) return "16-bit images must be in millimetres, so correct their unit, or change z_min and z_max";
-  if (depths.farthest >= kMillimetresFrom)
-    return "32-bit images must be in metres, but these look like millimetres, so divide them by 1000, or record them as 16UC1";
-  return "32-bit images must be in metres, so correct their unit, or change z_min and z_max";
 }
 
 /// A sentence about all frames that cannot be used for one reason.
@@ -40,8 +29,7 @@ std::string sentence(const std::string& reason, const std::string& frames, const
            "or folder is chosen.";
   if (reason == "saturated")
     return frames + " are 65535 in every pixel that is not 0, which means no measurement: check the camera and its driver.";
-  return frames + " have no depth from " + depth_range(config) + ", only depths from " + number(depths.nearest) + " to " +
-         number(depths.farthest) + " m: " + unit_remedy(depths) + ".";
+  return frames + " have no depth from " + depth_range(config) + ", only depths " + range_and_remedy(depths, config);
 }
 
 void warn_of_depths(const Run& run, std::vector<std::string>& warnings) {
@@ -65,8 +53,8 @@ void warn_of_few_depths(const Run& run, std::vector<std::string>& warnings) {
   if (all.measured() == 0 || all.usable == 0) return;
   const double share = static_cast<double>(all.usable) / static_cast<double>(all.measured());
   if (share >= kFewUsable) return;
-  warnings.push_back("Only " + number(100 * share) + " % of the measured depths are from " + depth_range(run.config) +
-                     ", all others from " + number(all.nearest) + " to " + number(all.farthest) + " m: " + unit_remedy(all) + ".");
+  warnings.push_back("Only " + number(100 * share) + " % of the measured depths are from " + depth_range(run.config) + ", all others " +
+                     range_and_remedy(all, run.config));
 }
 
 }  // namespace

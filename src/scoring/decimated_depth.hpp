@@ -58,7 +58,7 @@ struct DepthReading {
 inline void check_frame(const DepthFrame& frame) {
   const DepthImage& image = frame.depth;
   const Intrinsics& camera = frame.intrinsics;
-  const std::size_t pixel_size = image.encoding == DepthImage::Encoding::kMillimetresU16 ? sizeof(std::uint16_t) : sizeof(float);
+  const std::size_t pixel_size = image.encoding == DepthImage::Encoding::kStepsU16 ? sizeof(std::uint16_t) : sizeof(float);
   if (image.data == nullptr || image.width <= 0 || image.height <= 0) throw BadFrame("The depth image has no pixels; give one with data.");
   if (image.step < image.width * pixel_size) throw BadFrame("The depth image's step is shorter than a row of pixels; correct the step.");
   if (camera.width != image.width || camera.height != image.height) {
@@ -89,7 +89,7 @@ T read_pixel(const unsigned char* bytes, bool swap_bytes) {
 /// Depth at a pixel [m], as the image has it: any float, NaN and Inf included. Of 16 bits, 65535 is no measurement, like 0.
 inline float read_depth(const DepthImage& image, int column, int row, double depth_unit) {
   const auto* line = static_cast<const unsigned char*>(image.data) + static_cast<std::size_t>(row) * image.step;
-  if (image.encoding == DepthImage::Encoding::kMillimetresU16) {
+  if (image.encoding == DepthImage::Encoding::kStepsU16) {
     const auto steps = read_pixel<std::uint16_t>(line + column * sizeof(std::uint16_t), image.swap_bytes);
     return steps == 65535 ? 0 : static_cast<float>(steps * depth_unit);
   }

@@ -71,7 +71,7 @@ TEST(DepthMessages, AreViewedWhereTheyLie) {
     EXPECT_EQ(pixels.view.width, kWidth);
     EXPECT_EQ(pixels.view.height, kHeight);
     EXPECT_EQ(pixels.view.step, image.step);
-    EXPECT_EQ(pixels.view.encoding, DepthImage::Encoding::kMillimetresU16);
+    EXPECT_EQ(pixels.view.encoding, DepthImage::Encoding::kStepsU16);
     EXPECT_EQ(pixels.view.swap_bytes, big_endian) << "this test is for little-endian machines";
     EXPECT_EQ(message.raw.use_count(), 2) << "the pixels keep the message alive";
   }

@@ -27,7 +27,7 @@ class Remarks : public testing::Test {
     const std::vector<Pixel> pixels(static_cast<std::size_t>(width) * 8, pixel);
     DepthFrame frame;
     frame.depth.data = pixels.data();
-    frame.depth.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+    frame.depth.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
     frame.depth.width = width;
     frame.depth.height = 8;
     frame.depth.step = sizeof(Pixel) * static_cast<std::size_t>(width);
@@ -56,8 +56,8 @@ TEST_F(Remarks, ImagesWithoutAUsablePixelHaveTheLikelyCause) {
   EXPECT_TRUE(says(on_millimetres(0), "no measurement in any pixel"));
   EXPECT_TRUE(says(on(std::numeric_limits<float>::quiet_NaN()), "no measurement in any pixel"));
   EXPECT_TRUE(says(on_millimetres(65535), "65535"));
-  EXPECT_TRUE(says(on_millimetres(2), "millimetres"));
-  EXPECT_TRUE(says(on_millimetres(20000), "20 m: 16-bit images must be in millimetres"));
+  EXPECT_TRUE(says(on_millimetres(2), "depth_unit"));
+  EXPECT_TRUE(says(on_millimetres(20000), "20 m: 16-bit images are read in steps of depth_unit = 0.001 m"));
   EXPECT_TRUE(says(on(1500.0F), "look like millimetres"));
   EXPECT_TRUE(says(on(7.0F), "z_max"));
 }

@@ -89,7 +89,7 @@ class Inputs(MapperTest):
             self.assertIn(report.result, (FrameReport.INTEGRATED, FrameReport.DROPPED_BAD_IMAGE), report.reason)
             self.assertEqual(report.surfels, len(before), f'after an image of {value}')
             self.assertRegex(report.reason, r'^The depth image .*: .*\.$')
-        for value, reason in ((0, 'no measurement in any pixel'), (65535, '65535 in every pixel'), (20000, 'must be in millimetres')):
+        for value, reason in ((0, 'no measurement in any pixel'), (65535, '65535 in every pixel'), (20000, 'correct depth_unit')):
             report = self.mapper.report(self.camera.send(2, message=raw_image(numpy.full(shape, value, dtype=numpy.uint16), '16UC1', None)))
             self.assertEqual(report.result, FrameReport.INTEGRATED)
             self.assertRegex(report.reason, reason)

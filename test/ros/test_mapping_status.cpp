@@ -118,5 +118,16 @@ TEST_F(MappingStatusTest, ALoadedMapIsCountedBeforeTheFirstFrame) {
   EXPECT_EQ(filled().level, DiagnosticStatus::WARN) << "no image has come";
 }
 
+TEST_F(MappingStatusTest, FramesThatAddNothingAreAWarning) {
+  map(seconds(1));
+  for (int i = 0; i < 40; ++i, now_ += milliseconds(100)) add(FrameReport::INTEGRATED, "The depth image has no measurement.");
+  EXPECT_EQ(filled().message, "mapping") << "some of the last frames added something";
+  for (int i = 0; i < 20; ++i, now_ += milliseconds(100)) add(FrameReport::INTEGRATED, "The depth image has no measurement.");
+  EXPECT_EQ(filled().level, DiagnosticStatus::WARN);
+  EXPECT_EQ(filled().message, "The depth image has no measurement.");
+  map(seconds(1));
+  EXPECT_EQ(filled().level, DiagnosticStatus::OK);
+}
+
 }  // namespace
 }  // namespace frontier_surfels

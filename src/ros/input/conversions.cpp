@@ -55,12 +55,12 @@ Pixels<View> view(const cv::Mat& decoded) {
 
 Pixels<DepthImage> view_depth(const cv::Mat& decoded) {
   Pixels<DepthImage> pixels = view<DepthImage>(decoded);
-  pixels.view.encoding = decoded.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  pixels.view.encoding = decoded.type() == CV_16UC1 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   return pixels;
 }
 
 Pixels<DepthImage> view_depth(const sensor_msgs::ImageConstPtr& image, DepthImage::Encoding encoding) {
-  check_size(*image, encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4);
+  check_size(*image, encoding == DepthImage::Encoding::kStepsU16 ? 2 : 4);
   Pixels<DepthImage> pixels = view<DepthImage>(image);
   pixels.view.encoding = encoding;
   pixels.view.swap_bytes = static_cast<bool>(image->is_bigendian) != kThisMachineIsBigEndian;
@@ -135,8 +135,7 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 Pixels<DepthImage> depth_pixels(const ImageMessage& message) {
   if (message.compressed) return view_depth(decode_depth(*message.compressed));
   const std::string& encoding = message.raw->encoding;
-  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16)
-    return view_depth(message.raw, DepthImage::Encoding::kMillimetresU16);
+  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16) return view_depth(message.raw, DepthImage::Encoding::kStepsU16);
   if (encoding == encodings::TYPE_32FC1) return view_depth(message.raw, DepthImage::Encoding::kMetresF32);
   throw BadFrame("the encoding '" + encoding + "' is not one of depth (16UC1, mono16, 32FC1)");
 }
@@ -157,7 +156,7 @@ std::optional<cv::Size> stated_size(const ImageMessage& message) {
 }
 
 cv::Mat copy(const DepthImage& image) {
-  cv::Mat depth(image.height, image.width, image.encoding == DepthImage::Encoding::kMillimetresU16 ? CV_16UC1 : CV_32FC1);
+  cv::Mat depth(image.height, image.width, image.encoding == DepthImage::Encoding::kStepsU16 ? CV_16UC1 : CV_32FC1);
   const std::size_t size = depth.elemSize();
   for (int row = 0; row < depth.rows; ++row) {
     std::uint8_t* values = depth.ptr(row);

@@ -3,27 +3,15 @@
 #include <algorithm>
 
 #include "frontier_surfels/depth_census.hpp"
-#include "ros/input/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr double kStillDistance = 1e-4;       // [m], below the noise of any tracked pose
 constexpr double kStillRotation = 1e-4;       // largest difference of a rotation matrix' elements
-constexpr float kMillimetresFrom = 100;       // [m]; depths in metres that are larger are probably millimetres
 constexpr std::size_t kAlternatingSizes = 4;  // a camera whose mode is changed to and fro has fewer
 
-std::string number(double value) { return rounded_text(value, 3); }
-
 std::string size_text(const std::pair<int, int>& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
-
-/// What to do about depths out of range, whose unit may be wrong.
-std::string unit_remedy(const DepthCensus& depths) {
-  if (!depths.in_metres) return "16-bit images must be in millimetres, so correct their unit, or change z_min and z_max";
-  if (depths.farthest >= kMillimetresFrom)
-    return "32-bit images must be in metres, but these look like millimetres, so divide them by 1000, or publish them as 16UC1";
-  return "32-bit images must be in metres, so correct their unit, or change z_min and z_max";
-}
 
 }  // namespace
 
@@ -46,8 +34,7 @@ std::string FrameRemarks::about_pixels(const DepthImage& image) const {
            "depth/image is remapped to the right topic.";
   if (depths.saturated == depths.measured())
     return "The depth image is 65535 in every pixel that is not 0, which means no measurement: check the camera and its driver.";
-  return "The depth image has no depth from z_min = " + number(config_.z_min) + " m to z_max = " + number(config_.z_max) +
-         " m, only depths from " + number(depths.nearest) + " to " + number(depths.farthest) + " m: " + unit_remedy(depths) + ".";
+  return "The depth image has no depth from " + depth_range(config_) + ", only depths " + range_and_remedy(depths, config_);
 }
 
 std::string FrameRemarks::about_distortion(const sensor_msgs::CameraInfo& info) {

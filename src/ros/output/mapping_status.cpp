@@ -44,9 +44,9 @@ const char* result_name(std::uint8_t result) {
 void MappingStatus::add(const FrameReport& report, Clock::time_point now) {
   ++counts_[report.result];
   if (report.result == FrameReport::INTEGRATED) {
-    mapped_.emplace_back(now, report.total_ms);
+    mapped_.push_back({now, report.total_ms, report.reason});
     mapped_since_ = true;
-    while (now - mapped_.front().first > kWindow) mapped_.pop_front();
+    while (now - mapped_.front().time > kWindow) mapped_.pop_front();
   } else if (report.result == FrameReport::FAILED) {
     failed_ = now;
     failure_ = report.reason;
@@ -63,10 +63,10 @@ void MappingStatus::set_map_folder_fault(const std::string& fault) {
 }
 
 void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now) {
-  while (!mapped_.empty() && now - mapped_.front().first > kWindow) mapped_.pop_front();
+  while (!mapped_.empty() && now - mapped_.front().time > kWindow) mapped_.pop_front();
   summarize(status, now);
   std::vector<double> times;
-  for (const auto& frame : mapped_) times.push_back(frame.second);
+  for (const MappedFrame& frame : mapped_) times.push_back(frame.total_ms);
   status.add("rate [Hz]", fixed_text(static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count(), 1));
   status.add("time a frame, median [ms]", fixed_text(median(times), 1));
   status.add("time a frame, longest [ms]", fixed_text(times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()), 1));
@@ -92,6 +92,8 @@ void MappingStatus::summarize(diagnostic_updater::DiagnosticStatusWrapper& statu
     status.summary(DiagnosticStatus::WARN, "no depth image has come on " + depth_topic_);
   } else if (mapped_.empty()) {
     status.summary(DiagnosticStatus::WARN, last_reason_.empty() ? "no depth image has come lately" : last_reason_);
+  } else if (std::none_of(mapped_.begin(), mapped_.end(), [](const MappedFrame& frame) { return frame.remark.empty(); })) {
+    status.summary(DiagnosticStatus::WARN, mapped_.back().remark);
   } else {
     status.summary(DiagnosticStatus::OK, "mapping");
   }

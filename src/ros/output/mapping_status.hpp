@@ -20,6 +20,7 @@ namespace frontier_surfels {
 const char* result_name(std::uint8_t result);
 
 /// Counts frames by their result. A failed frame is an ERROR with its reason for at least five seconds, and until frames are mapped again.
+/// If there is a remark on every frame of the last five seconds, as when no depth can be used, it is a WARNING.
 class MappingStatus {
  public:
   using Clock = std::chrono::steady_clock;
@@ -40,14 +41,20 @@ class MappingStatus {
   void fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now);
 
  private:
+  struct MappedFrame {
+    Clock::time_point time;
+    double total_ms;
+    std::string remark;  ///< why the frame adds nothing, or what is odd about it; empty for most
+  };
+
   void summarize(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now) const;
 
   const std::string device_, depth_topic_;
   std::array<std::uint64_t, kResults> counts_ = {};
-  std::deque<std::pair<Clock::time_point, double>> mapped_;  ///< frames of the last seconds: time and total_ms
-  Clock::time_point failed_;                                 ///< when the last frame failed
-  bool mapped_since_ = false;  ///< a frame has been mapped after the one that failed, or what it failed for is over
-  std::string failure_;        ///< reason of the last frame that failed
+  std::deque<MappedFrame> mapped_;  ///< frames of the last seconds
+  Clock::time_point failed_;        ///< when the last frame failed
+  bool mapped_since_ = false;       ///< a frame has been mapped after the one that failed, or what it failed for is over
+  std::string failure_;             ///< reason of the last frame that failed
   std::string map_folder_fault_;
   std::string last_reason_;  ///< of the last frame that was dropped
   Statistics map_;
