@@ -10,7 +10,7 @@ set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
 file(MAKE_DIRECTORY ${POCL_CACHE})
 
 # Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
-set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room).*)\\.cpp$")
+set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room|tools).*)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB ROS_TEST_SOURCES CONFIGURE_DEPENDS test/ros/test_*.cpp)

@@ -224,7 +224,10 @@ void Mapper::Impl::finish_frame(Report& report) {
 }
 
 std::vector<Surfel> Mapper::surfels() const {
-  return on_device([&] { return impl_->map.download(); });
+  return on_device([&] {
+    impl_->commands.forget_times();  // of earlier calls: without frames they would pile up
+    return impl_->map.download();
+  });
 }
 
 std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const {
@@ -239,6 +242,7 @@ Changes Mapper::changes(std::uint64_t since) const {
 }
 
 Changes Mapper::Impl::changes(std::uint64_t since) {
+  commands.forget_times();
   const bool given_again = since != 0 && !readers.knows(since);
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
   const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
@@ -259,6 +263,16 @@ std::vector<Surfel> Mapper::whole_map() const {
 
 void Mapper::save(const std::string& path) const { write_map(path, whole_map()); }
 
+void Mapper::flush() {
+  if (!impl_->archive) return;
+  on_device([&] {
+    impl_->commands.forget_times();
+    impl_->archive->flush(static_cast<std::uint32_t>(impl_->sequence));
+  });
+}
+
+std::string Mapper::map_folder_fault() const { return impl_->archive ? impl_->archive->fault() : ""; }
+
 void Mapper::load(const std::string& path) {
   const std::vector<Surfel> surfels = read_map(path);
   try {
@@ -275,6 +289,7 @@ void Mapper::load(const std::vector<Surfel>& surfels) {
 }
 
 void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels) {
+  commands.forget_times();
   map.replace(surfels, static_cast<std::uint32_t>(sequence + 1));
   ++sequence;
   views.clear(map.size() == 0);

@@ -1,5 +1,6 @@
 /// The changes since a sequence number, and parts of the map.
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -172,6 +173,24 @@ TEST(MapperBox, HoldsTheSurfelsInside) {
   EXPECT_TRUE(same(all, mapper.surfels(Eigen::AlignedBox3f(Eigen::Vector3f::Constant(-infinity), Eigen::Vector3f::Constant(infinity)))));
   EXPECT_TRUE(mapper.surfels(Eigen::AlignedBox3f()).empty());
   EXPECT_EQ(mapper.surfels(Eigen::AlignedBox3f(all[7].position)).size(), 1u) << "the border belongs to the box";
+}
+
+/// Readers of a paused mapper go on asking, and each answer launches kernels.
+TEST(PausedMapper, TakesNoMemoryForItsAnswers) {
+  Mapper mapper(undecimated());
+  for (const auto& frame : orbit_frames(coarse_camera(), 12, 3)) mapper.integrate(frame.view());
+  const auto expect_bounded = [](const char* name, const auto& ask) {
+    const auto ask_often = [&](int times) {
+      for (int n = 0; n < times; ++n) ask();
+      return mallinfo2().uordblks;  // [byte] that are allocated
+    };
+    const std::size_t before = ask_often(100), after = ask_often(1000);
+    EXPECT_LT(after, before + (std::size_t{100} << 10)) << name;
+  };
+  expect_bounded("surfels", [&] { mapper.surfels(); });
+  expect_bounded("changes", [&] { mapper.changes(mapper.sequence()); });
+  expect_bounded("changes of the last frame", [&] { mapper.changes(mapper.sequence() - 1); });
+  expect_bounded("reset", [&] { mapper.reset(); });
 }
 
 }  // namespace

@@ -9,10 +9,12 @@ import io
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -298,14 +300,14 @@ class MapFolder(unittest.TestCase):
         self.recording, self.report, self.kept = (os.path.join(self.folder.name, name) for name in ('walls', 'report', 'kept'))
         os.makedirs(os.path.join(self.recording, 'depth'))
         for frame in range(2):
-            Picture.fromarray(numpy.full((60, 80), 1500, dtype=numpy.uint16)).save(os.path.join(self.recording, 'depth', f'{frame:04}.png'))
+            Picture.fromarray(numpy.full((60, 80), 2750, dtype=numpy.uint16)).save(os.path.join(self.recording, 'depth', f'{frame:04}.png'))
         for name, text in (('camera.txt', '70 70 39.5 29.5 80 60\n'), ('poses.txt', '0 0 0 0 0 0 0 1\n1 200 0 0 0 0 0 1\n')):
             with open(os.path.join(self.recording, name), 'w', encoding='utf-8') as file:
                 file.write(text)
 
-    def replay(self):
+    def replay(self, *more):
         return run(self.recording, '--report', self.report, '--set', f'map_folder={self.kept}', '--set', 'eviction_radius=10',
-                   '--set', 'decimation=1', '--no-exact')
+                   '--set', 'decimation=1', '--no-exact', *more)
 
     def test_the_report_has_the_whole_map(self):
         result = self.replay()
@@ -317,6 +319,27 @@ class MapFolder(unittest.TestCase):
             again = self.replay()
             self.assertEqual(again.returncode, FAILED, again.stdout)
             self.assertRegex(again.stderr, 'kept.*already has a map.*another')
+
+    def test_a_folder_that_is_deleted_meanwhile(self):
+        os.rename(os.path.join(self.recording, 'poses.txt'), os.path.join(self.recording, 'groundtruth.txt'))
+        with open(os.path.join(self.recording, 'groundtruth.txt'), 'a', encoding='utf-8') as file:
+            file.write('2 200 0 0 0 0 0 1\n')
+        with open(os.path.join(self.recording, 'depth.txt'), 'w', encoding='utf-8') as file:
+            file.write('0 depth/0000.png\n1 depth/0001.png\n2 fifo.png\n')
+        fifo = os.path.join(self.recording, 'fifo.png')  # replay_score waits here until somebody writes
+        os.mkfifo(fifo)
+
+        def delete():
+            with open(fifo, 'wb'):
+                shutil.rmtree(self.kept)
+
+        threading.Thread(target=delete, daemon=True).start()  # waits for ever if replay_score fails before
+        result = self.replay('--octomap-resolution', 0)
+        self.assertEqual(result.returncode, FAILED, result.stderr)
+        sentence = f'The map folder lacks a part of the map. The map folder {self.kept} has been deleted, moved or replaced'
+        self.assertIn(f'replay_score: {sentence}', result.stderr)
+        self.assertIn(sentence, ' '.join(read_json(self.report)['warnings']), 'the report is written all the same')
+        self.assertGreater(len(read_surfels(self.report)), 2000)
 
 
 class ReadmePicture(unittest.TestCase):

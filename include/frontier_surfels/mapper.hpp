@@ -56,6 +56,14 @@ class Mapper {
   /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
+  /// With a map_folder, waits until the whole map is written to it; without one, does nothing. To be called before the mapper is destroyed:
+  /// the destructor writes the map as well, but can tell nobody that it failed.
+  /// @throws FileError  the folder cannot be written, or has been deleted. The map loses nothing, and flush() may be called again
+  void flush();
+
+  /// Why the map folder could not be written at the last try; empty if all is well. Later frames and flush() try again. From any thread.
+  std::string map_folder_fault() const;
+
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. The recent views are forgotten, and so is which
   /// surfels stand in thin space (the method trusts these a little more from then on), because the file does not have it.
   /// @throws FileError  the file cannot be used; the map stays as it was

@@ -220,6 +220,7 @@ void replay_and_score(const Options& options) {
   folder.commit();
   make_report_page(options.report);
   std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
+  if (!run.unsaved.empty()) throw FileError(run.unsaved);
   if (is_empty) throw empty_map(options.recording, summary);
 }
 

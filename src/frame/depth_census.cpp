@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "config/c_locale.hpp"
 #include "frame/depth_pixels.hpp"
 
 namespace frontier_surfels {
@@ -13,6 +14,7 @@ namespace {
 constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
 std::string number(double value) {
+  const CLocale c_locale;
   char text[40];
   std::snprintf(text, sizeof(text), "%.3g", value);
   return text;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
+
+#include "config/config_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -25,11 +26,7 @@ double voxels_of(const Intrinsics& camera, const Config& config) {
 }
 
 /// A number of voxels in billions, with a digit.
-std::string billions(double voxels) {
-  char text[400];
-  std::snprintf(text, sizeof(text), "%.1f", voxels * 1e-9);
-  return text;
-}
+std::string billions(double voxels) { return to_text(voxels * 1e-9, 1); }
 
 /// An axis of the cuboid and of the image.
 struct Axis {

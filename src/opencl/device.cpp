@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <sstream>
 
 namespace frontier_surfels {
 namespace {
@@ -49,11 +48,9 @@ std::vector<Candidate> all_devices() {
 }
 
 std::string describe(const Candidate& candidate) {
-  std::ostringstream text;
-  text << candidate.platform << ": " << candidate.device.getInfo<CL_DEVICE_NAME>() << " ("
-       << type_name(candidate.device.getInfo<CL_DEVICE_TYPE>()) << ", " << candidate.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()
-       << " compute units)";
-  return text.str();
+  return candidate.platform + ": " + candidate.device.getInfo<CL_DEVICE_NAME>() + " (" +
+         type_name(candidate.device.getInfo<CL_DEVICE_TYPE>()) + ", " +
+         std::to_string(candidate.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()) + " compute units)";
 }
 
 std::string listing(const std::vector<Candidate>& candidates) {

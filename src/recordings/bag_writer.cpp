@@ -13,6 +13,7 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
+#include "config/config_text.hpp"
 #include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
@@ -232,7 +233,7 @@ void check(const BagOptions& options) {
 
 ros::Time to_ros_time(double stamp) {
   if (!(stamp > 0) || stamp >= std::numeric_limits<std::uint32_t>::max()) {
-    throw Error("The stamp " + std::to_string(stamp) +
+    throw Error("The stamp " + to_text(stamp) +
                 " s is not a valid time of ROS, which must be above 0 and below 2^32 s: correct the stamps of the recording.");
   }
   return ros::Time(stamp);

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "config/c_locale.hpp"
+
 namespace frontier_surfels::replay {
 namespace {
 
@@ -32,6 +34,7 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
 /// Accepts nan and inf, unlike a stream: trackers write them where they have lost the camera.
 double to_number(const Line& line, std::size_t index) {
   const std::string& word = line.words[index];
+  const CLocale c_locale;
   char* end = nullptr;
   const double number = std::strtod(word.c_str(), &end);
   if (end != word.c_str() + word.size()) throw Error(line.where + ": '" + word + "' is not a number.");

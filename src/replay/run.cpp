@@ -101,6 +101,11 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
       std::count_if(run.surfels.begin(), run.surfels.end(), [](const Surfel& surfel) { return surfel.label == Label::kOccupied; }));
   run.statistics.frontier = run.statistics.surfels - run.statistics.occupied;
   run.peak_rss_mb = peak_rss_mb();
+  try {
+    mapper.flush();
+  } catch (const FileError& fault) {  // the scores are worth having all the same
+    run.unsaved = std::string("The map folder lacks a part of the map. ") + fault.what();
+  }
   return run;
 }
 

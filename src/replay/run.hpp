@@ -78,6 +78,7 @@ struct Run {
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
   bool stopped = false;    ///< before the end of the recording
+  std::string unsaved;     ///< why the map folder lacks a part of the map; empty: it has all, or there is none
 };
 
 /// A run that has not begun: its date is now, and it knows where the poses come from.

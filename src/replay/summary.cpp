@@ -7,6 +7,7 @@
 #include <fstream>
 #include <numeric>
 
+#include "config/c_locale.hpp"
 #include "replay/warnings.hpp"
 
 namespace frontier_surfels::replay {
@@ -60,6 +61,7 @@ double octomap_ms(const FrameRecord& frame) { return frame.octomap ? frame.octom
 double octomap_cpu_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->cpu_ms : 0; }
 
 std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
+  const CLocale c_locale;
   char text[200];
   std::snprintf(text, sizeof(text), format, a, b, c, d);
   return text;

@@ -5,6 +5,7 @@
 #include <regex>
 #include <type_traits>
 
+#include "config/c_locale.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::replay {
@@ -45,6 +46,7 @@ std::string unit_of(const std::string& name) {
 
 /// @throws std::exception if the text is not a number
 double parse_number(const std::string& text) {
+  const CLocale c_locale;
   std::size_t end = 0;
   const double value = std::stod(text, &end);
   if (end != text.size() || !std::isfinite(value) || std::abs(value) > 1e9) throw std::invalid_argument(text);

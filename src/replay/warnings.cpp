@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "config/c_locale.hpp"
+
 namespace frontier_surfels::replay {
 namespace {
 
@@ -11,6 +13,7 @@ constexpr double kStillDistance = 1e-4;  // [m], below the noise of any tracked 
 constexpr double kStillRotation = 1e-4;  // largest difference of a rotation matrix' elements
 
 std::string number(double value) {
+  const CLocale c_locale;
   char text[40];
   std::snprintf(text, sizeof(text), "%.3g", value);
   return text;
@@ -73,6 +76,7 @@ std::vector<std::string> warnings(const Run& run) {
   if (is_still(run.frames))
     all.push_back("The camera never moves: all " + std::to_string(run.frames.size()) + " frames have the same pose in the frame '" +
                   run.world_frame + "'" + (run.if_still.empty() ? "" : "; if it did move, " + run.if_still) + ".");
+  if (!run.unsaved.empty()) all.push_back(run.unsaved);
   return all;
 }
 

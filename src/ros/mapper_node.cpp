@@ -26,6 +26,17 @@ services    ~reset, ~pause, ~save_map, ~load_map, ~get_surfels
 Parameters, in the node's private namespace:
 )";
 
+/// @return exit code
+int end(frontier_surfels::MapperRos& mapper) {
+  try {
+    mapper.stop();
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "[FATAL] " << error.what() << std::endl;  // ROS_FATAL prints nothing after ros::spin()
+    return 1;
+  }
+}
+
 bool is_help(const std::string& argument) { return argument == "--help" || argument == "-h"; }
 
 }  // namespace
@@ -39,9 +50,9 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "mapper");
   const ros::NodeHandle nh, pnh("~");  // must outlive the mapper: without a node handle the error below would not be logged
   try {
-    const MapperRos mapper(nh, pnh);
+    MapperRos mapper(nh, pnh);
     ros::spin();
-    return 0;
+    return end(mapper);
   } catch (const std::exception& error) {
     ROS_FATAL("%s", error.what());
     return 1;

@@ -5,6 +5,7 @@
 #include <frontier_surfels/MapFile.h>
 #include <ros/callback_queue.h>
 #include <ros/console.h>
+#include <ros/init.h>
 #include <ros/publisher.h>
 #include <ros/service_server.h>
 #include <ros/spinner.h>
@@ -15,12 +16,16 @@
 #include <atomic>
 #include <filesystem>
 #include <future>
+#include <iostream>
+#include <utility>
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
+#include "ros/input/number_text.hpp"
+#include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
@@ -56,6 +61,7 @@ class MapperRos::Impl {
  public:
   Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
   ~Impl();
+  void stop();
 
  private:
   void tell_parameters();
@@ -69,6 +75,7 @@ class MapperRos::Impl {
   void start_again(const ros::Time& from, const ros::Time& to);
   void show_other_map();
   void publish_changes();
+  void after_work();
 
   // Services
   void start_services();
@@ -85,8 +92,9 @@ class MapperRos::Impl {
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
-  Mapper mapper_;   // only used by the mapping thread
-  MapState state_;  // only used by the mapping thread
+  Mapper mapper_;                         // only used by the mapping thread
+  MapFolderWatch folder_watch_{mapper_};  // only used by the mapping thread
+  MapState state_;                        // only used by the mapping thread
   FramePoses poses_;
   std::atomic<std::uint32_t> surfels_{0};  ///< in the map, for reports of frames that are not mapped
   std::atomic<std::uint64_t> sequence_{0};
@@ -101,12 +109,14 @@ class MapperRos::Impl {
   ros::NodeHandle service_nh_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+  ros::WallTimer folder_timer_;
+  bool stopped_ = false;
 };
 
 MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
     : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame), service_nh_(pnh) {
   reports_ = pnh_.advertise<FrameReport>("report", 100);
-  worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { publish_changes(); });
+  worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { after_work(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
@@ -117,6 +127,8 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   for (const auto& camera : cameras_) camera->start(nh_, pnh_);
   watch_ = std::make_unique<InputWatch>(nh_, cameras_, [this](const std::string& reason) { report_missing(reason); });
   worker_->start();
+  if (!config_.mapper.map_folder.empty())  // looked at also while no images come
+    folder_timer_ = nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { worker_->wake(); });
   start_services();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
 }
@@ -141,11 +153,27 @@ void MapperRos::Impl::start_services() {
 }
 
 MapperRos::Impl::~Impl() {
+  try {
+    stop();
+  } catch (const std::exception& fault) {
+    ROS_ERROR("%s", fault.what());
+    if (!ros::ok()) std::cerr << "[ERROR] " << fault.what() << std::endl;  // ROS_ERROR prints nothing after the shutdown
+  }
+}
+
+void MapperRos::Impl::stop() {
+  if (std::exchange(stopped_, true)) return;
+  folder_timer_.stop();
   watch_.reset();
   worker_->stop();  // before the cameras, because it asks them
   cameras_.clear();
   service_spinner_->stop();
   publisher_.reset();
+  try {
+    mapper_.flush();
+  } catch (const std::exception& fault) {
+    throw FileError(std::string("The end of the map is lost. ") + fault.what());
+  }
 }
 
 void MapperRos::Impl::report_dropped(const DroppedImage& image) {
@@ -230,8 +258,8 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
 /// Time has jumped back, for all cameras: an image of another one must not reset the map once more.
 void MapperRos::Impl::start_again(const ros::Time& from, const ros::Time& to) {
   const bool reset = config_.on_time_jump == "reset";
-  ROS_WARN("Time has jumped back by %.1f s: old transforms are forgotten, and the map is %s (~on_time_jump).", messages::seconds(to, from),
-           reset ? "reset" : "kept");
+  ROS_WARN("Time has jumped back by %s s: old transforms are forgotten, and the map is %s (~on_time_jump).",
+           fixed_text(messages::seconds(to, from), 1).c_str(), reset ? "reset" : "kept");
   if (reset) mapper_.reset();
   for (const auto& camera : cameras_) camera->set_last_mapped(std::min(camera->last_mapped(), to));
 }
@@ -253,6 +281,11 @@ void MapperRos::Impl::publish_changes() {
   } catch (const std::exception& fault) {
     ROS_ERROR_THROTTLE(5, "The map cannot be published: %s", fault.what());
   }
+}
+
+void MapperRos::Impl::after_work() {
+  publish_changes();
+  diagnostics_->set_map_folder_fault(folder_watch_.look(Clock::now()));
 }
 
 template <typename Message>
@@ -355,5 +388,6 @@ bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Resp
 
 MapperRos::MapperRos(const ros::NodeHandle& nh, const ros::NodeHandle& pnh) : impl_(std::make_unique<Impl>(nh, pnh)) {}
 MapperRos::~MapperRos() = default;
+void MapperRos::stop() { impl_->stop(); }
 
 }  // namespace frontier_surfels

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "config/config_text.hpp"
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
@@ -37,10 +38,10 @@ struct DepthReading {
         carve_no_return(config.carve_no_return),
         carve_beyond_range(config.carve_beyond_range) {
     if (!(z_min > 0 && z_max > z_min && std::isfinite(z_max))) {
-      throw Error("The depth range must be 0 < z_min < z_max, but is " + std::to_string(z_min) + " to " + std::to_string(z_max) + " m.");
+      throw Error("The depth range must be 0 < z_min < z_max, but is " + to_text(z_min) + " to " + to_text(z_max) + " m.");
     }
     if (!(depth_unit > 0 && std::isfinite(depth_unit))) {
-      throw Error("The depth unit must be above 0, but is " + std::to_string(depth_unit) + " m.");
+      throw Error("The depth unit must be above 0, but is " + to_text(depth_unit) + " m.");
     }
     if (decimation < 1) throw Error("The decimation must be 1 or more, but is " + std::to_string(decimation) + ".");
   }

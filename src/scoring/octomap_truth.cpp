@@ -8,6 +8,7 @@
 #include <cmath>
 #include <future>
 
+#include "config/config_text.hpp"
 #include "scoring/cpu_clock.hpp"
 #include "scoring/octomap_cloud.hpp"
 #include "scoring/surfel_tree.hpp"
@@ -117,7 +118,7 @@ struct OctomapTruth::Impl {
 
 OctomapTruth::OctomapTruth(double resolution, const Config& config) {
   if (!(resolution > 0 && std::isfinite(resolution))) {
-    throw Error("The resolution of the OctoMap must be above 0, but is " + std::to_string(resolution) + " m.");
+    throw Error("The resolution of the OctoMap must be above 0, but is " + to_text(resolution) + " m.");
   }
   const DepthReading reading(config);
   impl_.reset(new Impl{OcTree(resolution), reading});

@@ -33,11 +33,19 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map)
 
 MapArchive::~MapArchive() {
   try {
-    folder_.flush();
-    if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
-    folder_.flush();
+    flush(saved_);
   } catch (const std::exception&) {  // what was saved before is still there
   }
+}
+
+void MapArchive::flush(std::uint32_t frame) {
+  folder_.flush();
+  if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
+  shrunk_.clear();
+  saved_ = frame;
+  fault_ = nullptr;
+  next_try_ = 0;
+  folder_.flush();
 }
 
 void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }

@@ -21,7 +21,7 @@ class MapArchive {
  public:
   /// @throws FileError  config.map_folder cannot be used
   MapArchive(const Config& config, SurfelMap& map);
-  ~MapArchive();  ///< writes what is in memory
+  ~MapArchive();  ///< as flush(), but nobody is told if it fails
 
   /// Are there blocks of an earlier map?
   bool empty() const { return folder_.size() == 0; }
@@ -37,6 +37,13 @@ class MapArchive {
 
   /// Writes the blocks that have changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
+
+  /// Writes all that has changed, and waits for it. @param frame  the last one in the map
+  /// @throws FileError  it could not be written; it stays in memory
+  void flush(std::uint32_t frame);
+
+  /// Why the last save could not be written; empty if all is well. From any thread.
+  std::string fault() const { return folder_.fault(); }
 
   /// The surfels on disk only. @throws FileError
   std::vector<Surfel> stored() const;

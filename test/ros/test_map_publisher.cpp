@@ -39,8 +39,8 @@ class RandomMap {
     changes.sequence = map_.sequence();
     for (const auto& [id, sequence] : changed_) {
       if (sequence <= since) continue;
-      if (id < map_.slots().size() && exists(map_.slots()[id])) {
-        changes.updated.push_back(map_.slots()[id]);
+      if (const Surfel* surfel = map_.slots().find(id)) {
+        changes.updated.push_back(*surfel);
       } else {
         changes.removed.push_back(id);
       }

@@ -78,6 +78,36 @@ TEST_F(MappingStatusTest, ALaterReasonDoesNotReplaceThatOfAFailure) {
   EXPECT_EQ(filled().message, "There is no transform.");
 }
 
+TEST_F(MappingStatusTest, AFaultOfTheMapFolderClearsWithIt) {
+  const std::string fault = "The map folder /map cannot be written.";
+  map(seconds(6));
+  status_.set_map_folder_fault(fault);
+  EXPECT_EQ(filled().level, DiagnosticStatus::ERROR) << "although frames are mapped";
+  EXPECT_EQ(filled().message, fault);
+  status_.set_paused(true);
+  EXPECT_EQ(filled().level, DiagnosticStatus::ERROR);
+  status_.set_map_folder_fault("");
+  EXPECT_EQ(filled().level, DiagnosticStatus::OK);
+}
+
+/// The last frame before the camera stopped failed because of the folder.
+TEST_F(MappingStatusTest, AFrameThatFailedForTheMapFolderIsNoErrorForEver) {
+  const std::string fault = "The map folder /map cannot be written.";
+  map(seconds(1));
+  add(FrameReport::FAILED, fault);
+  status_.set_map_folder_fault(fault);
+  now_ += seconds(100);
+  EXPECT_EQ(filled().level, DiagnosticStatus::ERROR);
+  status_.set_map_folder_fault("");
+  EXPECT_EQ(filled().level, DiagnosticStatus::WARN) << "no image comes";
+
+  add(FrameReport::FAILED, "The device is lost.");
+  status_.set_map_folder_fault(fault);
+  status_.set_map_folder_fault("");
+  now_ += seconds(100);
+  EXPECT_EQ(filled().message, "The device is lost.");
+}
+
 TEST_F(MappingStatusTest, ALoadedMapIsCountedBeforeTheFirstFrame) {
   Statistics map;
   map.surfels = 1234;

@@ -115,6 +115,26 @@ class Processes(unittest.TestCase):
         self.assertIn(os.path.join(home, 'map') + '.', output)
         self.assertIn('map.sqlite', os.listdir(os.path.join(home, 'map')))
 
+    def test_a_deleted_map_folder_is_told_at_once_and_at_the_end(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        camera, mapper = CameraTopics(), Mapper('bereft')
+        process = self.start('bereft', map_folder=os.path.join(folder, 'map'))
+        mapper.wait_until_connected(*camera.raw())
+        shutil.rmtree(os.path.join(folder, 'map'))
+        self.assertEqual(mapper.report(camera.send(0)).result, FrameReport.INTEGRATED)
+        told = []
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: told.extend(
+            status.message for status in message.status if 'bereft' in status.name and status.level == 2))
+        self.addCleanup(subscriber.unregister)
+        sentence = 'has been deleted, moved or replaced'
+        wait_until(lambda: any(sentence in message for message in told), what='the fault in /diagnostics')
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 1, output)
+        self.assertRegex(output, f'ERROR.*: The map folder .* {sentence}')
+        self.assertRegex(output, f'FATAL. The end of the map is lost. The map folder .* {sentence}')
+
     def test_a_loaded_map_is_shown_before_the_first_frame(self):
         """/diagnostics counts it, and its clouds, markers and updates are stamped with now."""
         camera, source = CameraTopics(), Mapper('source')

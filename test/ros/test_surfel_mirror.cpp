@@ -91,7 +91,7 @@ TEST(SurfelMirror, IsReplacedByAWholeMap) {
   for (const Surfel& surfel : whole.updated) EXPECT_TRUE(box.contains(surfel.position));
 }
 
-TEST(SurfelMirror, RefusesAGapAndIdsThatCannotBe) {
+TEST(SurfelMirror, RefusesAGap) {
   Rng rng(3);
   SurfelMirror mirror;
   Follower truth;
@@ -99,8 +99,22 @@ TEST(SurfelMirror, RefusesAGapAndIdsThatCannotBe) {
   mirror.apply(first, 0);
   truth.apply(first);
   for (const std::uint64_t since : {6, 8}) EXPECT_THROW(mirror.apply(random_changes(rng, since, kIds, 50), since), Error);
-  EXPECT_THROW(mirror.apply({8, {random_surfel(rng, 5), random_surfel(rng, 0xfffffffe)}, {}}, 7), Error);
   expect_equal(mirror, truth);
+}
+
+/// Ids are slots of the mapper's, of which most may be empty: they say nothing of how many surfels there are.
+TEST(SurfelMirror, TakesIdsAboveTheNumberOfSurfelsInACloud) {
+  Rng rng(8);
+  SurfelMirror mirror;
+  Follower truth;
+  const auto apply = [&](const Changes& changes) {
+    mirror.apply(changes, mirror.sequence());
+    truth.apply(changes);
+    expect_equal(mirror, truth);
+  };
+  apply({1, {random_surfel(rng, 3), random_surfel(rng, kMostSurfels), random_surfel(rng, 0xffffffff)}, {}});
+  apply({2, {random_surfel(rng, kMostSurfels), random_surfel(rng, 0x80000000)}, {3, 4, 0xfffffffe}});
+  apply({3, {}, {0xffffffff, 0x80000000}});
 }
 
 TEST(MergedChanges, EqualTheTwoOneByOne) {

@@ -13,6 +13,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "ros/input/number_text.hpp"
+
 namespace frontier_surfels::messages {
 namespace {
 
@@ -123,7 +125,7 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
   std::memcpy(&header, message.data.data(), sizeof(header));
   const auto [a, b] = header.quantisation;
   if (!std::isfinite(a) || !std::isfinite(b) || a == 0)
-    throw BadFrame("its depth quantisation (" + std::to_string(a) + ", " + std::to_string(b) +
+    throw BadFrame("its depth quantisation (" + rounded_text(a, 6) + ", " + rounded_text(b, 6) +
                    ") is not valid: record it again with compressed_depth_image_transport, or record raw images");
   return metres_from_inverse(values, header.quantisation);
 }

@@ -42,6 +42,7 @@ std::string FramePoses::explain(const std::string& frame, const ros::Time& stamp
   }
 
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text.precision(3);
   try {
     const double ahead = messages::seconds(buffer_.lookupTransform(world_frame_, camera, any).header.stamp, stamp);

@@ -43,6 +43,7 @@ const char* assign(XmlRpcValue& value, std::string& field) {
 
 std::string shown(const XmlRpcValue& value) {
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text << value;
   return text.str();
 }
@@ -93,6 +94,7 @@ std::vector<std::string> NodeConfig::problems() const {
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
       if (std::is_same_v<std::decay_t<decltype(value)>, bool> || (value >= info.lowest && value <= info.highest)) return;
       std::ostringstream text;
+      text.imbue(std::locale::classic());
       text << info.name << " is " << value << " " << info.unit << ": it must be from " << info.lowest << " to " << info.highest << " "
            << info.unit << ".";
       faults.push_back(text.str());

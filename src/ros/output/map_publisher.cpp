@@ -211,8 +211,7 @@ void MapPublisher::apply_and_tell(const std::deque<PushedChanges>& queue) {
   if (!whole || map_.sequence() == 0) return;
   at_once_[kUpdate] = false;
   if (!is_heard(kUpdate)) return;
-  for (const Surfel& slot : map_.slots())
-    if (exists(slot)) touched.extend(slot.position);
+  for (const Surfel& surfel : map_.slots()) touched.extend(surfel.position);
   publish_update({map_, touched, confident_, most_surfels_});
 }
 

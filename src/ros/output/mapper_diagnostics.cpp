@@ -53,6 +53,11 @@ void MapperDiagnostics::set_paused(bool paused) {
   status_.set_paused(paused);
 }
 
+void MapperDiagnostics::set_map_folder_fault(const std::string& fault) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_.set_map_folder_fault(fault);
+}
+
 void MapperDiagnostics::fill(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   status_.fill(status, Clock::now());

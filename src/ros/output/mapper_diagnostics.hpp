@@ -23,6 +23,7 @@ class MapperDiagnostics {
   /// Sets the size of the map after a frame, a reset or a load.
   void set_map(const Statistics& map);
   void set_paused(bool paused);
+  void set_map_folder_fault(const std::string& fault);  ///< empty: none
 
  private:
   using Clock = MappingStatus::Clock;

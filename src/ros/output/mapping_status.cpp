@@ -4,6 +4,8 @@
 #include <numeric>
 #include <vector>
 
+#include "ros/input/number_text.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -54,19 +56,26 @@ void MappingStatus::add(const FrameReport& report, Clock::time_point now) {
   }
 }
 
+void MappingStatus::set_map_folder_fault(const std::string& fault) {
+  const bool over = fault.empty() && !map_folder_fault_.empty();
+  if (over && failure_ == map_folder_fault_) mapped_since_ = true;  // or it would stay an error until the next frame
+  map_folder_fault_ = fault;
+}
+
 void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now) {
   while (!mapped_.empty() && now - mapped_.front().time > kWindow) mapped_.pop_front();
   summarize(status, now);
   std::vector<double> times;
   for (const MappedFrame& frame : mapped_) times.push_back(frame.total_ms);
-  status.addf("rate [Hz]", "%.1f", static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count());
-  status.addf("time a frame, median [ms]", "%.1f", median(times));
-  status.addf("time a frame, longest [ms]", "%.1f", times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()));
-  for (std::uint8_t result = 0; result < kResults; ++result) status.add(std::string("frames ") + result_name(result), counts_[result]);
+  status.add("rate [Hz]", fixed_text(static_cast<double>(times.size()) / std::chrono::duration<double>(kWindow).count(), 1));
+  status.add("time a frame, median [ms]", fixed_text(median(times), 1));
+  status.add("time a frame, longest [ms]", fixed_text(times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()), 1));
+  for (std::uint8_t result = 0; result < kResults; ++result)
+    status.add(std::string("frames ") + result_name(result), std::to_string(counts_[result]));
   if (counts_[FrameReport::FAILED] > 0) status.add("last failure", failure_);
-  status.add("surfels", map_.surfels);
-  status.addf("memory of the map [MB]", "%.1f", static_cast<double>(map_.map_bytes) / 1e6);
-  status.addf("memory on the device [MB]", "%.1f", static_cast<double>(map_.device_bytes) / 1e6);
+  status.add("surfels", std::to_string(map_.surfels));
+  status.add("memory of the map [MB]", fixed_text(static_cast<double>(map_.map_bytes) / 1e6, 1));
+  status.add("memory on the device [MB]", fixed_text(static_cast<double>(map_.device_bytes) / 1e6, 1));
   status.add("device", device_);
 }
 
@@ -75,6 +84,8 @@ void MappingStatus::summarize(diagnostic_updater::DiagnosticStatusWrapper& statu
   const std::uint64_t all = std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0});
   if (counts_[FrameReport::FAILED] > 0 && (!mapped_since_ || now - failed_ <= kWindow)) {
     status.summary(DiagnosticStatus::ERROR, failure_);
+  } else if (!map_folder_fault_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, map_folder_fault_);
   } else if (paused_) {
     status.summary(DiagnosticStatus::OK, "paused");
   } else if (all == 0) {

@@ -34,6 +34,9 @@ class MappingStatus {
   void set_map(const Statistics& map) { map_ = map; }
   void set_paused(bool paused) { paused_ = paused; }
 
+  /// Sets why the map folder cannot be written, which is an ERROR; empty: it can.
+  void set_map_folder_fault(const std::string& fault);
+
   std::uint64_t count(std::uint8_t result) const { return counts_[result]; }
   void fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now);
 
@@ -50,9 +53,10 @@ class MappingStatus {
   std::array<std::uint64_t, kResults> counts_ = {};
   std::deque<MappedFrame> mapped_;  ///< frames of the last seconds
   Clock::time_point failed_;        ///< when the last frame failed
-  bool mapped_since_ = false;       ///< a frame has been mapped after the one that failed
+  bool mapped_since_ = false;       ///< a frame has been mapped after the one that failed, or what it failed for is over
   std::string failure_;             ///< reason of the last frame that failed
-  std::string last_reason_;         ///< of the last frame that was dropped
+  std::string map_folder_fault_;
+  std::string last_reason_;  ///< of the last frame that was dropped
   Statistics map_;
   bool paused_ = false;
 };

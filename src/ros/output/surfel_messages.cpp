@@ -75,9 +75,9 @@ Surfel to_surfel(const Point& point) {
   return s;
 }
 
-/// A cloud of the surfels that `wanted` picks from a range. @param count  number of them
-template <typename Wanted>
-PointCloud2 pack(const Surfel* begin, const Surfel* end, std::size_t count, Label confident, Wanted wanted) {
+/// A cloud of `count` surfels. @param next  returns one after the other
+template <typename Next>
+PointCloud2 pack(std::size_t count, Label confident, const Next& next) {
   PointCloud2 cloud;
   for (const Field& field : kFields) {
     cloud.fields.emplace_back();
@@ -102,9 +102,8 @@ PointCloud2 pack(const Surfel* begin, const Surfel* end, std::size_t count, Labe
     cloud.data.insert(cloud.data.end(), bytes, bytes + filled * sizeof(Point));
     filled = 0;
   };
-  for (const Surfel* surfel = begin; surfel != end; ++surfel) {
-    if (!wanted(*surfel)) continue;
-    points[filled++] = to_point(*surfel, confident);
+  for (std::size_t n = 0; n < count; ++n) {
+    points[filled++] = to_point(next(), confident);
     if (filled == points.size()) flush();
   }
   flush();
@@ -162,15 +161,18 @@ std::uint32_t count32(std::size_t count) {
 
 PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident, std::size_t most) {
   check_count(surfels.size(), most);
-  return pack(surfels.data(), surfels.data() + surfels.size(), surfels.size(), confident, [](const Surfel&) { return true; });
+  auto at = surfels.begin();
+  return pack(surfels.size(), confident, [&]() -> const Surfel& { return *at++; });
 }
 
 PointCloud2 to_cloud(const SurfelMirror& map, Label confident, std::optional<Label> only, std::size_t most) {
   const std::size_t count = !only ? map.size() : *only == Label::kOccupied ? map.occupied() : map.size() - map.occupied();
   check_count(count, most);
-  const Surfel* begin = map.slots().data();
-  return pack(begin, begin + map.slots().size(), count, confident,
-              [&](const Surfel& s) { return exists(s) && (!only || s.label == *only); });
+  auto at = map.slots().begin();
+  return pack(count, confident, [&]() -> const Surfel& {
+    while (only && at->label != *only) ++at;
+    return *at++;
+  });
 }
 
 std::vector<Surfel> to_surfels(const PointCloud2& cloud) {
@@ -196,19 +198,22 @@ UpdateMessages::UpdateMessages(const Changes& changes, std::uint64_t since, cons
                                std::size_t most)
     : sequence_(changes.sequence),
       since_(since),
-      slots_(changes.updated),
+      next_surfel_([at = changes.updated.begin()]() mutable -> const Surfel& {
+        while (!exists(*at)) ++at;
+        return *at++;
+      }),
       removed_(changes.removed),
       box_(box),
       confident_(confident),
       most_(most),
-      surfels_left_(static_cast<std::size_t>(std::count_if(slots_.begin(), slots_.end(), exists))) {
+      surfels_left_(static_cast<std::size_t>(std::count_if(changes.updated.begin(), changes.updated.end(), exists))) {
   count_parts();
 }
 
 UpdateMessages::UpdateMessages(const SurfelMirror& map, const Eigen::AlignedBox3f& box, Label confident, std::size_t most)
     : sequence_(map.sequence()),
       since_(0),
-      slots_(map.slots()),
+      next_surfel_([at = map.slots().begin()]() mutable -> const Surfel& { return *at++; }),
       removed_(kNone),
       box_(box),
       confident_(confident),
@@ -238,10 +243,7 @@ SurfelUpdate UpdateMessages::next() {
   removed_sent_ = removed_end;
 
   const std::size_t count = removed_sent_ == removed_.size() ? std::min(surfels_left_, most_) : 0;
-  std::size_t slot = slot_;
-  for (std::size_t found = 0; found < count; ++slot) found += exists(slots_[slot]);
-  message.surfels = pack(slots_.data() + slot_, slots_.data() + slot, count, confident_, exists);
-  slot_ = slot;
+  message.surfels = pack(count, confident_, next_surfel_);
   surfels_left_ -= count;
   return message;
 }

@@ -6,6 +6,7 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -51,12 +52,12 @@ class UpdateMessages {
   void count_parts();
 
   std::uint64_t sequence_, since_;
-  const std::vector<Surfel>& slots_;  ///< those without a surfel are left out
+  std::function<const Surfel&()> next_surfel_;
   const std::vector<std::uint32_t>& removed_;
   const Eigen::AlignedBox3f box_;
   const Label confident_;
   const std::size_t most_;
-  std::size_t surfels_left_, slot_ = 0, removed_sent_ = 0;
+  std::size_t surfels_left_, removed_sent_ = 0;
   std::uint32_t part_ = 0, parts_ = 0;
 };
 
