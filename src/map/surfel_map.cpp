@@ -57,6 +57,9 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
 
 /// Makes room for pages. New ones have no bits in `alive` and `changed`, like all pages without surfels.
 void SurfelMap::grow(std::size_t pages) {
+  constexpr std::size_t kMaxPages = (std::size_t{1} << 32) / PAGE_SLOTS;  // slots are numbered with 32 bits
+  if (pages > kMaxPages)
+    throw DeviceError("The map would have more than 4.29 billion surfels, which is the limit; raise decimation, or reset the map.");
   const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
   const auto grow_marks = [&](DeviceArray<cl_ulong>& marks) {
     const std::size_t before = marks.size();
