@@ -73,11 +73,11 @@ struct Mapper::Impl {
   }
 
   Report integrate(const DepthFrame& input);
+  Report update(const DepthFrame& input);
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
-  void finish_pages(std::uint32_t number);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
-  void finish_frame(Report& report);
+  void finish_frame(std::uint32_t number, Report& report);
   Changes changes(std::uint64_t since);
   void begin_map(const std::vector<Surfel>& surfels);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
@@ -104,8 +104,7 @@ struct Mapper::Impl {
   ChangeReaders readers;
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
-  std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of a frame that failed half way; 0: none
-  bool pages_changed = false;         ///< by a failed frame or by the archive, since the last finished frame
+  bool pages_changed = false;         ///< by the archive, since the last frame
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -117,7 +116,20 @@ Report Mapper::integrate(const DepthFrame& frame) {
   return on_device([&] { return impl_->integrate(frame); });
 }
 
+/// All or nothing.
 Report Mapper::Impl::integrate(const DepthFrame& input) {
+  try {
+    return update(input);
+  } catch (const std::exception&) {
+    try {
+      map.roll_back();
+    } catch (const std::exception&) {  // the next call tries again
+    }
+    throw;
+  }
+}
+
+Report Mapper::Impl::update(const DepthFrame& input) {
   const auto start = Clock::now();
   Report report;
   report.stamp = input.stamp;
@@ -156,7 +168,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
     known = &known_space->compute(frame, visit.in_view(), candidates, map);
   }
 
-  // New surfel filter - 3.5. The frame may fail up to here: device memory for the rest is reserved now
+  // New surfel filter - 3.5. The map's own memory is enlarged before anything is removed
   report.created = creation.filter(frame, list, candidates, known);
   map.reserve(report.created);
 
@@ -168,23 +180,17 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  finish_frame(report);
+  finish_frame(number, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   commands.forget_times();  // a frame that failed half way has left some
-  frame_on_device = 0;
+  map.roll_back();          // of a failed frame that could not be undone at once
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
-  if (unfinished != 0) {  // the failed frame may have split surfels, or marked some as changed
-    pages_changed = true;
-    finish_pages(unfinished);
-    unfinished = 0;
-  }
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
-  unfinished = number;
   camera.set_image(image);
   views.set_current(image, T_world_camera);
   return make_frame(camera, map.window(), views, limits);
@@ -196,28 +202,28 @@ SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera&
   return visit.visit(frame, camera, observed.bits(), observed.column_end(), views, map, candidates);
 }
 
-void Mapper::Impl::finish_pages(std::uint32_t number) {
-  const std::vector<BlockKey> shrunk = map.finish_frame("labels", number);
-  if (archive) archive->note_shrunk(shrunk);
-}
-
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
 void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number) {
   bool changed = std::exchange(pages_changed, true);  // stays true if something throws
+  const std::uint64_t exact = std::exchange(frame_on_device, 0);
   const auto reach = [&] { return map.window_reach(camera.grid(), T_world_camera) + KnownHull::kReach * config.z_max; };
   while (archive->follow(T_world_camera.translation(), reach(), number)) changed = true;
   pages_changed = changed;
+  if (!changed) frame_on_device = exact;
 }
 
-void Mapper::Impl::finish_frame(Report& report) {
-  finish_pages(unfinished);
-  if (archive) archive->save_some(unfinished);
+void Mapper::Impl::finish_frame(std::uint32_t number, Report& report) {
+  map.finish_frame("labels", number);
+  report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
+  const std::vector<BlockKey> shrunk = map.commit(number);
   report.view_kept = views.keep_current();
-  report.stages = commands.take_times();
-  unfinished = 0;
   sequence = report.sequence;
   frame_on_device = pages_changed ? 0 : sequence;
   pages_changed = false;
+  if (archive) {
+    archive->note_shrunk(shrunk);
+    archive->save_some(number);
+  }
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.device_bytes = device_bytes();
@@ -226,6 +232,7 @@ void Mapper::Impl::finish_frame(Report& report) {
 std::vector<Surfel> Mapper::surfels() const {
   return on_device([&] {
     impl_->commands.forget_times();  // of earlier calls: without frames they would pile up
+    impl_->map.roll_back();
     return impl_->map.download();
   });
 }
@@ -248,8 +255,10 @@ Changes Mapper::Impl::changes(std::uint64_t since) {
   const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
   Changes changes = last_frame ? map.last_changes() : map.changes(since, given_again);
   changes.sequence = sequence;
-  readers.note(since, sequence);
-  map.reserve_ids(readers.slowest());
+  ChangeReaders told = readers;
+  told.note(since, sequence);
+  map.reserve_ids(told.slowest());
+  readers = told;  // nothing has failed: the reader gets the changes
   return changes;
 }
 

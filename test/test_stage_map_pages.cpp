@@ -117,6 +117,7 @@ class Pages {
 
   void finish() {
     map().finish_frame("test", frame_);
+    map().commit(frame_);
     if (!book_.pages.empty()) last_page_ = std::max(last_page_, book_.pages.rbegin()->first);
     std::set<std::uint32_t> full;
     for (const auto& [slot, surfel] : book_.surfels) full.insert(slot / PAGE_SLOTS);

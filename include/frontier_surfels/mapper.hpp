@@ -29,7 +29,8 @@ class Mapper {
   /// @throws BadFrame     the frame is unusable; nothing has changed
   /// @throws FileError    the map folder cannot be read, or an earlier write to it has failed. The frame is refused, the map loses nothing,
   ///                      and later frames may succeed. Blocks may have entered or left memory all the same; changes() reports these
-  /// @throws DeviceError  the device failed or is out of memory
+  /// @throws DeviceError  the device failed or is out of memory. The map is as it was before the frame. If the device fails again while the
+  ///                      frame is undone, the next call undoes it first, and throws as long as it cannot
   Report integrate(const DepthFrame& frame);
 
   /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame. The whole map is
@@ -71,6 +72,8 @@ class Mapper {
 
   /// Replaces the map by these surfels, which get new ids. Radii are limited to four blocks (2 m where z_max is at most 12 m), which is far
   /// more than this mapper makes.
+  /// @throws DeviceError  the device failed or is out of memory. The map is as it was; or it is lost, and all calls say so until load() or
+  ///                      reset() succeeds
   void load(const std::vector<Surfel>& surfels);
 
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.

@@ -1,4 +1,5 @@
 // Lists from bit fields and counts, in an order that does not depend on the number of threads: counts, their prefix sum, then the entries.
+// Sums stop at UINT_MAX instead of starting again at 0, so that the host can refuse them.
 
 // One work item handles a chunk of WORD_CHUNK words: it counts their set bits.
 //   in  words[count];   out counts[chunks]
@@ -29,7 +30,7 @@ __kernel void sum_chunks(__global const uint* values, const uint count, __global
   const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
   if (begin >= count) return;
   uint sum = 0;
-  for (uint n = begin; n < end; ++n) sum += values[n];
+  for (uint n = begin; n < end; ++n) sum = add_sat(sum, values[n]);
   chunk_sums[chunk] = sum;
 }
 
@@ -43,7 +44,7 @@ __kernel void scan_chunks(__global uint* values, const uint count, __global cons
   for (uint n = begin; n < end; ++n) {
     const uint value = values[n];
     values[n] = sum;
-    sum += value;
+    sum = add_sat(sum, value);
   }
   if (end == count) values[count] = sum;
 }
@@ -56,7 +57,7 @@ __kernel void scan_few(__global uint* values, const uint count) {
   for (uint n = 0; n < count; ++n) {
     const uint value = values[n];
     values[n] = sum;
-    sum += value;
+    sum = add_sat(sum, value);
   }
   values[count] = sum;
 }

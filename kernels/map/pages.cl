@@ -110,23 +110,70 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
   taken[page] = before_this | filled;
 }
 
-// One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved, and those slots that a
-// failed frame has emptied.
-//   in  page_block, alive, changed;   i/o reserved[count]
-__kernel void reserve_slots(const uint count, __global const int4* page_block, __global const ulong* alive, __global const ulong* changed,
-                            const uint told, __global ulong* reserved) {
+// One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved.
+//   in  page_block, alive;   i/o reserved[count]
+__kernel void reserve_slots(const uint count, __global const int4* page_block, __global const ulong* alive, const uint told,
+                            __global ulong* reserved) {
   const uint page = get_global_id(0);
-  if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page] | changed[page];
+  if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page];
+}
+
+// One work item handles a page of the window: it keeps what the frame may overwrite next. Called again before more is overwritten.
+//   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
+//       page_block, alive, taken, changed, surfels: the map; surfels marked as changed may be overwritten, too
+//   out kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count]: as at the first call
+//       kept_slots[count]: a bit for each surfel kept in kept_surfels[PAGE_SLOTS count]
+__kernel void back_up_pages(__global const uint* pages, const uint count, const int first, __global const ulong* freed,
+                            __global const int4* page_block, __global const ulong* alive, __global const ulong* taken,
+                            __global const ulong* changed, __global const uint4* surfels, __global uint* kept_pages,
+                            __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_taken, __global ulong* kept_slots,
+                            __global uint4* kept_surfels) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = pages[n];
+  if (first) {
+    kept_pages[n] = page;
+    kept_frames[n] = page_block[page].w;
+    kept_alive[n] = alive[page];
+    kept_taken[n] = taken[page];
+    kept_slots[n] = 0;
+  }
+  const ulong slots = kept_alive[n] & ~kept_slots[n] & (freed[n] | changed[page]);
+  kept_slots[n] |= slots;
+  for (ulong left = slots; left != 0; left &= left - 1) {
+    const uint bit = (uint)lowest_bit(left);
+    kept_surfels[PAGE_SLOTS * n + bit] = surfels[PAGE_SLOTS * page + bit];
+  }
+}
+
+// One work item handles a page that back_up_pages has kept, after the frame has failed.
+//   in  what back_up_pages has kept;   out page_block, alive, taken, surfels: the map as it was
+__kernel void restore_pages(__global const uint* kept_pages, const uint count, __global const int* kept_frames,
+                            __global const ulong* kept_alive, __global const ulong* kept_taken, __global const ulong* kept_slots,
+                            __global const uint4* kept_surfels, __global int4* page_block, __global ulong* alive, __global ulong* taken,
+                            __global uint4* surfels) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = kept_pages[n];
+  page_block[page].w = kept_frames[n];
+  alive[page] = kept_alive[n];
+  taken[page] = kept_taken[n];
+  for (ulong left = kept_slots[n]; left != 0; left &= left - 1) {
+    const uint bit = (uint)lowest_bit(left);
+    surfels[PAGE_SLOTS * page + bit] = kept_surfels[PAGE_SLOTS * n + bit];
+  }
 }
 
 // One work item handles a page of the window at the end of a frame.
 //   in  pages[count], alive;   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
-//   out changes[count]: this frame's;  empty[count]: 1 if nothing is left in the page
+//   out changed_pages[count], changes[count]: the pages, and what this frame has changed in them;  empty[count]: 1 if nothing is left
 __kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
-                           const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
+                           const uint frame, __global int4* page_block, __global uint* changed_pages, __global ulong* changes,
+                           __global uchar* empty) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
+  changed_pages[n] = page;
   changes[n] = changed[page];
   empty[n] = alive[page] == 0 ? 1 : 0;
   if (changed[page] != 0) page_block[page].w = (int)frame;

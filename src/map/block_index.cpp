@@ -23,6 +23,16 @@ std::uint32_t BlockIndex::add_page(const BlockKey& block) {
   return page;
 }
 
+void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_t end) {
+  const auto found = blocks_.find(block);
+  found->second.pop_back();
+  if (found->second.empty()) blocks_.erase(found);
+  if (page >= end)
+    --end_;
+  else
+    free_.push_back(page);
+}
+
 void BlockIndex::remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame) {
   const auto found = blocks_.find(block);
   if (found == blocks_.end()) return;

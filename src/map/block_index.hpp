@@ -20,6 +20,9 @@ class BlockIndex {
   /// Adds one page to a block: a free page if there is one, else the page at end(). @return number of the page
   std::uint32_t add_page(const BlockKey& block);
 
+  /// Undoes the last add_page(), or after that the one before it. @param end  end() before the first one that will be undone
+  void take_back(const BlockKey& block, std::uint32_t page, std::size_t end);
+
   /// Removes a page from its block. Does nothing if the page is not the block's.
   /// @param frame  the page becomes free by release(frame) or later; 0: it is free at once
   void remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame = 0);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
@@ -41,6 +42,10 @@ class SurfelMap {
   /// Lists the pages of all blocks within a distance [m] of the window. @return number of pages
   std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
 
+  /// Keeps what the frame may overwrite, so that roll_back() can undo the frame: surfels that are marked as changed, and those in `freed`.
+  /// @param freed  surfels that are going to leave the map, a word for each page that the window had when it was opened
+  void back_up(const char* stage, const DeviceArray<cl_ulong>& freed);
+
   /// Makes room for `additional` more surfels in this window.
   void reserve(std::size_t additional);
 
@@ -50,10 +55,18 @@ class SurfelMap {
   /// Subtracts surfels that a kernel has removed from size().
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Marks the pages that changed as changed in this frame, and frees the empty ones. @return block of each freed page
-  std::vector<BlockKey> finish_frame(const char* stage, std::uint32_t frame);
+  /// Marks the pages that changed as changed in this frame, and finds those that it has left empty. The frame can still fail.
+  void finish_frame(const char* stage, std::uint32_t frame);
 
-  /// Changes of the last frame; available until the next one begins.
+  /// Ends the frame for good, after finish_frame(): frees the empty pages. @return block of each freed page
+  std::vector<BlockKey> commit(std::uint32_t frame);
+
+  /// Undoes what a failed frame, or a failed add_block() or drop_block(), has done since the last commit(). Nothing else can be done with
+  /// the map before this has succeeded. Does nothing if nothing has failed.
+  /// @throws DeviceError  the device fails again (call it again later), or it has failed in replace() and the map is lost
+  void roll_back();
+
+  /// Changes of the last frame.
   Changes last_changes();
   /// @}
 
@@ -68,7 +81,8 @@ class SurfelMap {
   /// given again at once, as at first.
   void reserve_ids(std::optional<std::uint64_t> told);
 
-  /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. @return slot of each surfel
+  /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. If the device fails meanwhile, the map
+  /// is lost until it is replaced again. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
   /// @name Whole blocks, for the archive. Called between frames; adding or dropping a block closes the last frame's window.
@@ -95,7 +109,30 @@ class SurfelMap {
  private:
   using Page = std::uint32_t;
   using PageVisitor = std::function<void(Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* surfels)>;
+
+  /// What roll_back() needs.
+  struct Undo {
+    bool open = false;                                 ///< something may have to be undone
+    bool lost = false;                                 ///< replace() has begun
+    double largest_radius = 0;                         ///< [m]
+    std::size_t size = 0, end = 0;                     ///< of the map, of the index
+    std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them
+    std::vector<std::pair<Page, cl_ulong>> dropped;    ///< pages of a dropped block, with their words of `alive`
+    std::size_t kept_pages = 0;                        ///< pages of which back_up() has kept something
+  };
+
+  /// Changes of a frame.
+  struct FrameChanges {
+    explicit FrameChanges(Commands& commands) : pages(commands), slots(commands) {}
+    DeviceArray<cl_uint> pages;
+    DeviceArray<cl_ulong> slots;  ///< a word for each of the pages
+    std::size_t count = 0;        ///< of pages
+  };
+
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
+  void begin_undo();
+  void restore();
+  Page add_page(const BlockKey& block);
   void grow(std::size_t pages);
   double window_margin(const Grid& grid) const;
   void list_window();
@@ -135,9 +172,18 @@ class SurfelMap {
   // Insertion
   DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
 
+  // What a failed frame has overwritten
+  Undo undo_;
+  DeviceArray<cl_uint> kept_pages_;
+  DeviceArray<cl_int> kept_frames_;
+  DeviceArray<cl_ulong> kept_alive_, kept_taken_, kept_slots_;
+  DeviceArray<cl_uint4> kept_surfels_;
+
   // Changes
-  DeviceArray<cl_ulong> changes_;
+  FrameChanges changes_[2];
+  int last_ = 0;  ///< which of changes_ are those of the last frame; the others are for the frame at hand
   DeviceArray<cl_uchar> empty_;
+  std::vector<std::size_t> empty_pages_;  ///< indices in window_pages_
   DeviceArray<cl_uint> changed_slots_;
   DeviceArray<cl_uint4> gathered_;
   DeviceArray<cl_int4> gathered_blocks_;

@@ -61,6 +61,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   packed.add_empty_pages(packed.index.end());
   grow(packed.index.end());
   close_window();
+  undo_.lost = true;
   surfels_.write(packed.surfels);
   alive_.write(packed.alive);
   if (reserves_ids_) reserved_.write(packed.alive);
@@ -69,6 +70,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   index_ = std::move(packed.index);
   size_ = surfels.size();
   largest_radius_ = packed.largest_radius;
+  undo_ = {};
   return slots;
 }
 
@@ -111,10 +113,11 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
   const std::size_t pages = (surfels.size() + PAGE_SLOTS - 1) / PAGE_SLOTS;
   grow(index_.end() + pages);
   close_window();
+  begin_undo();
   for (std::size_t n = 0; n < pages; ++n) {
     const auto begin = surfels.begin() + PAGE_SLOTS * n;
     const std::vector<cl_uint4> some(begin, std::min(begin + PAGE_SLOTS, surfels.end()));
-    const Page page = index_.add_page(block);
+    const Page page = add_page(block);
     surfels_.write(some, PAGE_SLOTS * page);
     const cl_ulong alive = some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1;
     alive_.write({alive}, page);
@@ -124,18 +127,27 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
   }
   size_ += surfels.size();
   for (const cl_uint4& packed : surfels) largest_radius_ = std::max<double>(largest_radius_, unpack(packed, block, block_size_).radius);
+  undo_ = {};
 }
 
 void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   const BlockIndex::Pages* found = index_.find(block);
   if (found == nullptr) return;
+  const BlockIndex::Pages pages = *found;
   close_window();
-  for (const Page page : BlockIndex::Pages(*found)) {
-    size_ -= static_cast<std::size_t>(__builtin_popcountll(alive_.read_one(page)));
+  begin_undo();
+  std::size_t dropped = 0;
+  for (const Page page : pages) {
+    undo_.dropped.emplace_back(page, alive_.read_one(page));
+    dropped += static_cast<std::size_t>(__builtin_popcountll(undo_.dropped.back().second));
+  }
+  for (const Page page : pages) {
     alive_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
-    index_.remove_page(block, page, removal(frame));
   }
+  for (const Page page : pages) index_.remove_page(block, page, removal(frame));
+  size_ -= dropped;
+  undo_ = {};
 }
 
 }  // namespace frontier_surfels

@@ -40,6 +40,7 @@ MapArchive::~MapArchive() {
 
 void MapArchive::flush(std::uint32_t frame) {
   folder_.flush();
+  map_.roll_back();
   if (const Blocks blocks = unsaved(); !blocks.empty()) folder_.write(map_.read_blocks(blocks));
   shrunk_.clear();
   saved_ = frame;
@@ -112,7 +113,12 @@ bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32
 }
 
 void MapArchive::save_some(std::uint32_t frame) {
-  if (frame >= saved_ + kSavePeriod || saved_ == 0) save(unsaved(), frame, frame);
+  if (frame < saved_ + kSavePeriod && saved_ != 0) return;
+  try {
+    save(unsaved(), frame, frame);
+  } catch (const std::exception&) {  // the device failed, and the frame is in the map already
+    fault_ = std::current_exception();
+  }
 }
 
 /// Sorted. Blocks that have become empty are among them.
