@@ -250,6 +250,7 @@ Changes Mapper::changes(std::uint64_t since) const {
 
 Changes Mapper::Impl::changes(std::uint64_t since) {
   commands.forget_times();
+  map.roll_back();
   const bool given_again = since != 0 && !readers.knows(since);
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
   const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
