@@ -55,6 +55,7 @@ bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32
   if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
   const double radius = std::max(radius_, reach);
   if (followed_ && (camera - *followed_).norm() < map_.block_size() / 2 && radius <= followed_radius_) return false;
+  followed_.reset();  // if not all blocks come and go, the next frame tries again
   const bool evicted = evict(camera, radius, frame), fetched = fetch(camera, radius, frame);
   followed_ = camera;
   followed_radius_ = radius;
