@@ -32,6 +32,12 @@ if(NOT PCL_FOUND OR NOT PCL_IO_LIBRARY)
   message(WARNING "frontier_surfels: PCL was not found, so its test is LEFT OUT. Run scripts/install_dependencies --test.")
 endif()
 
+find_package(rapidcheck QUIET)
+if(NOT rapidcheck_FOUND)
+  list(FILTER TEST_SOURCES EXCLUDE REGEX "/test_mapper_model\\.cpp$")
+  message(WARNING "frontier_surfels: rapidcheck was not found, so its test is LEFT OUT. Run scripts/install_dependencies --test.")
+endif()
+
 foreach(source ${TEST_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   set(target frontier_surfels_${name})  # the packages of a workspace share one set of target names
@@ -63,6 +69,10 @@ if(TARGET frontier_surfels_test_pcl_clouds)
   target_include_directories(frontier_surfels_test_pcl_clouds SYSTEM PRIVATE ${pcl_conversions_INCLUDE_DIRS})
   list(FILTER pcl_conversions_LIBRARIES INCLUDE REGEX "pcl_")  # without those of viewers
   target_link_libraries(frontier_surfels_test_pcl_clouds PRIVATE ${pcl_conversions_LIBRARIES})
+endif()
+
+if(TARGET frontier_surfels_test_mapper_model)
+  target_link_libraries(frontier_surfels_test_mapper_model PRIVATE rapidcheck)
 endif()
 
 if(TARGET frontier_surfels_test_pcl)
