@@ -119,7 +119,8 @@ namespace frontier_surfels {
 #define COUNT_IN_VIEW 0
 #define COUNT_LARGE 1
 #define COUNT_REMOVED 2
-#define COUNTS 3
+#define COUNT_LABELLED 3
+#define COUNTS 4
 
 // Bit fields of the sign field's events: EVENT_PLANES for each family of paths (i, j, k), in this order.
 #define EVENT_ENTER_FORWARD 0

@@ -121,13 +121,15 @@ __kernel void reserve_slots(const uint count, __global const int4* page_block, _
 // One work item handles a page of the window: it keeps what the frame may overwrite next. Called again before more is overwritten.
 //   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
 //       page_block, alive, taken, changed, surfels: the map; surfels marked as changed may be overwritten, too
+//       room: number of surfels that can be kept
 //   out kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count]: as at the first call
-//       kept_slots[count]: a bit for each surfel kept in kept_surfels[PAGE_SLOTS count]
+//   i/o kept_slots[count]: a bit for each surfel that is kept;  kept_count: number of these
+//       kept_surfel_slots[kept_count], kept_surfels[kept_count]: where each of them was, in any order
 __kernel void back_up_pages(__global const uint* pages, const uint count, const int first, __global const ulong* freed,
                             __global const int4* page_block, __global const ulong* alive, __global const ulong* taken,
-                            __global const ulong* changed, __global const uint4* surfels, __global uint* kept_pages,
+                            __global const ulong* changed, __global const uint4* surfels, const uint room, __global uint* kept_pages,
                             __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_taken, __global ulong* kept_slots,
-                            __global uint4* kept_surfels) {
+                            __global uint* kept_count, __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
@@ -139,29 +141,34 @@ __kernel void back_up_pages(__global const uint* pages, const uint count, const 
     kept_slots[n] = 0;
   }
   const ulong slots = kept_alive[n] & ~kept_slots[n] & (freed[n] | changed[page]);
+  if (slots == 0) return;
   kept_slots[n] |= slots;
-  for (ulong left = slots; left != 0; left &= left - 1) {
-    const uint bit = (uint)lowest_bit(left);
-    kept_surfels[PAGE_SLOTS * n + bit] = surfels[PAGE_SLOTS * page + bit];
+  uint at = atomic_add(kept_count, (uint)popcount(slots));
+  for (ulong left = slots; left != 0 && at < room; left &= left - 1, ++at) {
+    kept_surfel_slots[at] = PAGE_SLOTS * page + (uint)lowest_bit(left);
+    kept_surfels[at] = surfels[kept_surfel_slots[at]];
   }
 }
 
 // One work item handles a page that back_up_pages has kept, after the frame has failed.
-//   in  what back_up_pages has kept;   out page_block, alive, taken, surfels: the map as it was
+//   in  kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count];   out page_block, alive, taken: the map as it was
 __kernel void restore_pages(__global const uint* kept_pages, const uint count, __global const int* kept_frames,
-                            __global const ulong* kept_alive, __global const ulong* kept_taken, __global const ulong* kept_slots,
-                            __global const uint4* kept_surfels, __global int4* page_block, __global ulong* alive, __global ulong* taken,
-                            __global uint4* surfels) {
+                            __global const ulong* kept_alive, __global const ulong* kept_taken, __global int4* page_block,
+                            __global ulong* alive, __global ulong* taken) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = kept_pages[n];
   page_block[page].w = kept_frames[n];
   alive[page] = kept_alive[n];
   taken[page] = kept_taken[n];
-  for (ulong left = kept_slots[n]; left != 0; left &= left - 1) {
-    const uint bit = (uint)lowest_bit(left);
-    surfels[PAGE_SLOTS * page + bit] = kept_surfels[PAGE_SLOTS * n + bit];
-  }
+}
+
+// One work item handles a surfel that back_up_pages has kept.
+//   in  kept_surfel_slots[count], kept_surfels[count];   out surfels: the map as it was
+__kernel void restore_surfels(const uint count, __global const uint* kept_surfel_slots, __global const uint4* kept_surfels,
+                              __global uint4* surfels) {
+  const uint n = get_global_id(0);
+  if (n < count) surfels[kept_surfel_slots[n]] = kept_surfels[n];
 }
 
 // One work item handles a page of the window at the end of a frame.

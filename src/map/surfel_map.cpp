@@ -48,6 +48,8 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       missing_(commands),
       order_(commands),
       kept_pages_(commands),
+      kept_count_(commands),
+      kept_surfel_slots_(commands),
       kept_frames_(commands),
       kept_alive_(commands),
       kept_taken_(commands),

@@ -44,13 +44,17 @@ class SurfelMap {
 
   /// Keeps what the frame may overwrite, so that roll_back() can undo the frame: surfels that are marked as changed, and those in `freed`.
   /// @param freed  surfels that are going to leave the map, a word for each page that the window had when it was opened
-  void back_up(const char* stage, const DeviceArray<cl_ulong>& freed);
+  /// @param count  number of surfels in `freed`
+  void back_up(const char* stage, const DeviceArray<cl_ulong>& freed, std::size_t count);
 
   /// Makes room for `additional` more surfels in this window.
   void reserve(std::size_t additional);
 
   /// Puts surfels into the map. @param cells  each surfel's cell of the window
   void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count);
+
+  /// Counts surfels that a kernel has marked as changed; back_up() makes room for them.
+  void marked(std::size_t count) { undo_.most_kept += count; }
 
   /// Subtracts surfels that a kernel has removed from size().
   void removed(std::size_t count) { size_ -= count; }
@@ -119,6 +123,7 @@ class SurfelMap {
     std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them
     std::vector<std::pair<Page, cl_ulong>> dropped;    ///< pages of a dropped block, with their words of `alive`
     std::size_t kept_pages = 0;                        ///< pages of which back_up() has kept something
+    std::size_t most_kept = 0, room = 0;               ///< surfels that back_up() may have to keep, and for which it has made room
   };
 
   /// Changes of a frame.
@@ -174,7 +179,7 @@ class SurfelMap {
 
   // What a failed frame has overwritten
   Undo undo_;
-  DeviceArray<cl_uint> kept_pages_;
+  DeviceArray<cl_uint> kept_pages_, kept_count_, kept_surfel_slots_;
   DeviceArray<cl_int> kept_frames_;
   DeviceArray<cl_ulong> kept_alive_, kept_taken_, kept_slots_;
   DeviceArray<cl_uint4> kept_surfels_;

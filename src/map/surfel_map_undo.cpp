@@ -1,10 +1,13 @@
 /// What makes a frame all or nothing: a backup of what it overwrites, its end, which cannot fail, and the way back.
+#include <algorithm>
+
 #include "map/surfel_map.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
+constexpr std::size_t kSpare = 32;  // buffers of kept surfels get 1 / kSpare more room than needed
 
 }  // namespace
 
@@ -23,7 +26,7 @@ SurfelMap::Page SurfelMap::add_page(const BlockKey& block) {
   return page;
 }
 
-void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed) {
+void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, std::size_t freed_count) {
   const bool first = undo_.kept_pages == 0;
   const std::size_t count = first ? window_pages() : undo_.kept_pages;  // pages that the frame has added need no backup
   if (count == 0) return;
@@ -32,10 +35,17 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed) {
   kept_alive_.resize(count);
   kept_taken_.resize(count);
   kept_slots_.resize(count);
-  kept_surfels_.resize(PAGE_SLOTS * count);
+  undo_.most_kept += freed_count;
+  kept_surfels_.grow(undo_.most_kept + 1, undo_.room, kSpare);
+  kept_surfel_slots_.grow(undo_.most_kept + 1, undo_.room, kSpare);
+  undo_.room = undo_.most_kept;
+  if (first) {
+    kept_count_.resize(1);
+    kept_count_.fill(stage, 0, 1);
+  }
   commands_.run(stage, "back_up_pages", count, kGroup, pages_list_(), static_cast<cl_uint>(count), static_cast<cl_int>(first), freed(),
-                page_block_(), alive_(), taken(), changed_(), surfels_(), kept_pages_(), kept_frames_(), kept_alive_(), kept_taken_(),
-                kept_slots_(), kept_surfels_());
+                page_block_(), alive_(), taken(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room), kept_pages_(), kept_frames_(),
+                kept_alive_(), kept_taken_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
   undo_.kept_pages = count;
 }
 
@@ -76,9 +86,12 @@ void SurfelMap::restore() {
   const char* stage = "roll_back";
   changed_.fill(stage, 0, changed_.size());
   const auto count = static_cast<cl_uint>(undo_.kept_pages);
-  if (count > 0)
-    commands_.run(stage, "restore_pages", count, kGroup, kept_pages_(), count, kept_frames_(), kept_alive_(), kept_taken_(), kept_slots_(),
-                  kept_surfels_(), page_block_(), alive_(), taken(), surfels_());
+  if (count > 0) {
+    commands_.run(stage, "restore_pages", count, kGroup, kept_pages_(), count, kept_frames_(), kept_alive_(), kept_taken_(), page_block_(),
+                  alive_(), taken());
+    const cl_uint kept = std::min(kept_count_.read_one(0), static_cast<cl_uint>(undo_.room));
+    if (kept > 0) commands_.run(stage, "restore_surfels", kept, kGroup, kept, kept_surfel_slots_(), kept_surfels_(), surfels_());
+  }
   for (const auto& [page, alive] : undo_.dropped) alive_.write({alive}, page);
   for (const auto& [block, page] : undo_.new_pages) alive_.write({0}, page);
   commands_.forget_times();
