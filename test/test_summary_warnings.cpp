@@ -108,6 +108,7 @@ TEST(Warnings, NameTheCauseAndTheRemedy) {
   expect_warning(run_of<std::uint16_t>({{65535}}), {"1 of 1", "65535"});
   expect_warning(run_of<std::uint16_t>({{60000}}), {"60 m", "correct depth_unit"});
   expect_warning(run_of<float>({{1500, 900}, {2500}}), {"2 of 2", "900 to 2.5e+03 m", "look like millimetres", "divide them by 1000"});
+  expect_warning(run_of<float>({{kInfinity, kNan}}), {"only depths of +Inf", "carve_no_return"});
   expect_warning(run_of<float>({{0.001F}}), {"0.001 m", "must be in metres"});
 }
 

@@ -74,6 +74,8 @@ DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
 std::string depth_range(const Config& config) { return "z_min = " + number(config.z_min) + " m to z_max = " + number(config.z_max) + " m"; }
 
 std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
+  if (depths.farthest == 0)  // none is finite
+    return "of +Inf, which means no surface within the camera's range: go nearer, or set carve_no_return to take them for free space.";
   std::string text = "from " + number(depths.nearest) + " to " + number(depths.farthest) + " m: ";
   if (!depths.in_metres) {
     text += "16-bit images are read in steps of depth_unit = " + number(config.depth_unit) + " m, so correct depth_unit";

@@ -333,7 +333,8 @@ bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& res
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
     const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
     const std::string path = absolute_path(request.path);
-    if (surfels.empty() && std::filesystem::exists(path))
+    std::error_code ignored;  // a name may be too long to be asked for
+    if (surfels.empty() && std::filesystem::is_regular_file(path, ignored))
       throw FileError("The map is empty, and was not written over the existing file " + path +
                       ": delete the file, or choose another path.");
     write_map(path, surfels);  // on this thread, so that mapping goes on

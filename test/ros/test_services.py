@@ -127,9 +127,10 @@ class Services(MapperTest):
         return xmlrpc.client.ServerProxy(server).getPid('/test_services')[2]
 
     def test_names_that_are_too_long(self):
-        self.map_walk(1)
         path = os.path.join(self.folder, 300 * 'n' + '.ply')
-        for answer in (self.mapper.save(path), self.mapper.load(path)):
+        of_an_empty_map = self.mapper.save(path)
+        self.map_walk(1)
+        for answer in (of_an_empty_map, self.mapper.save(path), self.mapper.load(path)):
             self.check_refused(answer, '/n{300}.ply.*a shorter one')
 
     def test_save_where_nothing_can_be_written(self):
