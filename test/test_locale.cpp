@@ -9,6 +9,7 @@
 #include "config/config_text.hpp"
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/number_text.hpp"
 #include "locale_input.hpp"
 
 namespace frontier_surfels {
@@ -37,7 +38,7 @@ std::string all_texts(const fs::path& folder) {
   set_field(config, "map_folder", "1,5");
   set_field(config, "eviction_radius", "1234567.5");
   set_field(config, "carve_no_return", "true");
-  said << to_yaml(config) << parameter_table() << to_text(1234567.125, 2) << to_text(-0.5) << to_text(12345) << "\n";
+  said << to_yaml(config) << parameter_table() << fixed_text(1234567.125, 2) << to_text(-0.5) << to_text(12345) << "\n";
   for (const char* value : {"2,5", "1.000.000", "", "x", "1000 m"}) fault([&] { set_field(config, "z_max", value); });
   for (const char* value : {"1.000", "1,000", "2.5"}) fault([&] { set_field(config, "recent_views", value); });
   const std::string yaml = (folder / "config.yaml").string();

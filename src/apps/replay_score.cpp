@@ -9,6 +9,7 @@
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "config/config_text.hpp"
 #include "frontier_surfels/paths.hpp"
 #include "frontier_surfels/ply.hpp"
 #include "replay/live_replay.hpp"
@@ -120,9 +121,8 @@ void read_config(const RawOptions& raw, Config& config) {
 OctomapResolution octomap_resolution(const std::string& text) {
   if (text == "auto") return std::nullopt;
   double resolution = NAN;
-  const bool is_number = CLI::detail::lexical_cast(text, resolution);
   // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
-  if (!is_number || (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10)))
+  if (!from_text(text, resolution) || (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10)))
     throw CLI::ValidationError("--octomap-resolution", "must be auto, 0, or from 0.0001 to 10 m");
   return resolution;
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "config/config_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels::bench {
 namespace {
@@ -30,6 +30,6 @@ void Table::row(const std::vector<std::string>& cells) const {
   std::fflush(stdout);
 }
 
-std::string fixed(double value, int digits) { return to_text(value, digits); }
+std::string fixed(double value, int digits) { return fixed_text(value, digits); }
 
 }  // namespace frontier_surfels::bench

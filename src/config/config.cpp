@@ -67,11 +67,6 @@ bool from_text(const std::string& text, double& value) {
   return true;
 }
 
-std::string to_text(double value, int digits) {
-  char text[400];  // the largest double has 309 digits before the point
-  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, std::min(digits, 20)).ptr};
-}
-
 std::string to_text(double value) {
   if (std::isnan(value)) return ".nan";
   if (std::isinf(value)) return value > 0 ? ".inf" : "-.inf";

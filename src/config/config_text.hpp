@@ -12,9 +12,6 @@ inline std::string to_text(const std::string& value) { return value; }
 /// The shortest decimal text that reads back as the same number; .nan, .inf or -.inf as in YAML.
 std::string to_text(double value);
 
-/// The number with this number of digits behind the point.
-std::string to_text(double value, int digits);
-
 /// Reads a number as YAML writes it; nothing may follow it. @return false if the text is none, or one that does not fit
 bool from_text(const std::string& text, int& value);
 bool from_text(const std::string& text, double& value);

@@ -3,22 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 
-#include "config/c_locale.hpp"
 #include "frame/depth_pixels.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
-std::string number(double value) {
-  const CLocale c_locale;
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
+std::string number(double value) { return rounded_text(value, 3); }
 
 void count_depth(float depth, const Config& config, DepthCensus& census) {
   if (std::isnan(depth) || depth <= 0) {

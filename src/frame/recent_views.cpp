@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "config/config_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -127,7 +127,7 @@ void RecentViews::enlarge_rooms(std::size_t size) {
   const std::size_t rooms = config_.recent_views + 1;
   const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
   if (pixels > std::numeric_limits<std::int32_t>::max())  // pixels are numbered with 32 bits
-    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + to_text(pixels * 1e-9, 6) +
+    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + fixed_text(pixels * 1e-9, 6) +
                    " billion pixels, more than 2 billion; raise decimation or lower recent_views.");
   std::size_t used = 0;
   for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "config/config_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -26,7 +26,7 @@ double voxels_of(const Intrinsics& camera, const Config& config) {
 }
 
 /// A number of voxels in billions, with a digit.
-std::string billions(double voxels) { return to_text(voxels * 1e-9, 1); }
+std::string billions(double voxels) { return fixed_text(voxels * 1e-9, 1); }
 
 /// An axis of the cuboid and of the image.
 struct Axis {

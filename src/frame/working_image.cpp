@@ -3,9 +3,9 @@
 #include <cmath>
 #include <string>
 
-#include "config/config_text.hpp"
 #include "frame/depth_pixels.hpp"
 #include "frame/view_grid.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -26,10 +26,10 @@ void check_depth(const DepthImage& image, const Config& config) {
 void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
   constexpr double kMaxPrincipalPoint = 1e6, kMinFocalLength = 1e-3;  // [pixel]; beyond these floats overflow
   if (!(k.fx >= kMinFocalLength && k.fy >= kMinFocalLength && std::isfinite(k.fx) && std::isfinite(k.fy)))
-    throw BadFrame("The focal lengths " + to_text(k.fx, 6) + ", " + to_text(k.fy, 6) +
+    throw BadFrame("The focal lengths " + fixed_text(k.fx, 6) + ", " + fixed_text(k.fy, 6) +
                    " must be positive: is the camera calibrated, and its camera_info published?");
   if (!(std::abs(k.cx) <= kMaxPrincipalPoint && std::abs(k.cy) <= kMaxPrincipalPoint))
-    throw BadFrame("The principal point " + to_text(k.cx, 6) + ", " + to_text(k.cy, 6) +
+    throw BadFrame("The principal point " + fixed_text(k.cx, 6) + ", " + fixed_text(k.cy, 6) +
                    " of the camera is not a number or far outside the image: is its camera_info right?");
   if (k.width != image.width || k.height != image.height)
     throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +

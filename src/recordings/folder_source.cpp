@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
-#include "config/config_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 #include "recordings/text_files.hpp"
 
 namespace frontier_surfels::replay {
@@ -66,7 +66,7 @@ Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
   }
   const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
-    throw BadFrame("the quaternion of its pose has the length " + to_text(rotation.norm(), 6) + " instead of 1");
+    throw BadFrame("the quaternion of its pose has the length " + fixed_text(rotation.norm(), 6) + " instead of 1");
   }
   return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
 }

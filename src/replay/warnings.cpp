@@ -1,9 +1,8 @@
 #include "replay/warnings.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
-#include "config/c_locale.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -11,13 +10,6 @@ namespace {
 constexpr double kFewUsable = 0.05;      // share of the measured depths
 constexpr double kStillDistance = 1e-4;  // [m], below the noise of any tracked pose
 constexpr double kStillRotation = 1e-4;  // largest difference of a rotation matrix' elements
-
-std::string number(double value) {
-  const CLocale c_locale;
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
 
 /// A sentence about all frames that cannot be used for one reason.
 /// @param frames  "3 of 7 depth images"
@@ -53,8 +45,8 @@ void warn_of_few_depths(const Run& run, std::vector<std::string>& warnings) {
   if (all.measured() == 0 || all.usable == 0) return;
   const double share = static_cast<double>(all.usable) / static_cast<double>(all.measured());
   if (share >= kFewUsable) return;
-  warnings.push_back("Only " + number(100 * share) + " % of the measured depths are from " + depth_range(run.config) + ", all others " +
-                     range_and_remedy(all, run.config));
+  warnings.push_back("Only " + rounded_text(100 * share, 3) + " % of the measured depths are from " + depth_range(run.config) +
+                     ", all others " + range_and_remedy(all, run.config));
 }
 
 }  // namespace

@@ -21,10 +21,10 @@
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/number_text.hpp"
 #include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
-#include "ros/input/number_text.hpp"
 #include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"

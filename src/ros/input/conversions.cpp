@@ -13,7 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "ros/input/number_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels::messages {
 namespace {

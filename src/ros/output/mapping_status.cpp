@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "ros/input/number_text.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
