@@ -72,6 +72,7 @@ struct Mapper::Impl {
     views.clear(archive->empty());
   }
 
+  void begin_call();
   Report integrate(const DepthFrame& input);
   Report update(const DepthFrame& input);
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
@@ -114,6 +115,13 @@ Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 Report Mapper::integrate(const DepthFrame& frame) {
   return on_device([&] { return impl_->integrate(frame); });
+}
+
+/// What each call that uses the map begins with. It forgets the times of earlier calls, which would pile up without frames, and undoes a
+/// failed frame that could not be undone at once.
+void Mapper::Impl::begin_call() {
+  commands.forget_times();
+  map.roll_back();
 }
 
 /// All or nothing.
@@ -186,8 +194,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
 }
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
-  commands.forget_times();  // a frame that failed half way has left some
-  map.roll_back();          // of a failed frame that could not be undone at once
+  begin_call();
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
@@ -231,8 +238,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, Report& report) {
 
 std::vector<Surfel> Mapper::surfels() const {
   return on_device([&] {
-    impl_->commands.forget_times();  // of earlier calls: without frames they would pile up
-    impl_->map.roll_back();
+    impl_->begin_call();
     return impl_->map.download();
   });
 }
@@ -249,8 +255,7 @@ Changes Mapper::changes(std::uint64_t since) const {
 }
 
 Changes Mapper::Impl::changes(std::uint64_t since) {
-  commands.forget_times();
-  map.roll_back();
+  begin_call();
   const bool given_again = since != 0 && !readers.knows(since);
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
   const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
