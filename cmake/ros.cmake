@@ -44,7 +44,7 @@ endif()
     list(APPEND exported_libraries frontier_surfels_scoring)
   endif()
   find_package(catkin REQUIRED COMPONENTS cv_bridge diagnostic_updater geometry_msgs image_geometry image_transport message_generation
-    nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs tf2_ros visualization_msgs ${tools_need})
+    nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs visualization_msgs ${tools_need})
   add_message_files(FILES FrameReport.msg SurfelUpdate.msg)
   add_service_files(FILES GetSurfels.srv MapFile.srv)
   generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)

@@ -10,7 +10,7 @@ set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
 file(MAKE_DIRECTORY ${POCL_CACHE})
 
 # Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
-set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room).*)\\.cpp$")
+set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room|tools).*)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB ROS_TEST_SOURCES CONFIGURE_DEPENDS test/ros/test_*.cpp)
@@ -30,6 +30,12 @@ find_library(PCL_IO_LIBRARY pcl_io)  # the component io would look for VTK and M
 if(NOT PCL_FOUND OR NOT PCL_IO_LIBRARY)
   list(FILTER TEST_SOURCES EXCLUDE REGEX "/test_pcl\\.cpp$")
   message(WARNING "frontier_surfels: PCL was not found, so its test is LEFT OUT. Run scripts/install_dependencies --test.")
+endif()
+
+find_package(rapidcheck QUIET)
+if(NOT rapidcheck_FOUND)
+  list(FILTER TEST_SOURCES EXCLUDE REGEX "/test_mapper_model\\.cpp$")
+  message(WARNING "frontier_surfels: rapidcheck was not found, so its test is LEFT OUT. Run scripts/install_dependencies --test.")
 endif()
 
 foreach(source ${TEST_SOURCES})
@@ -65,6 +71,10 @@ if(TARGET frontier_surfels_test_pcl_clouds)
   target_link_libraries(frontier_surfels_test_pcl_clouds PRIVATE ${pcl_conversions_LIBRARIES})
 endif()
 
+if(TARGET frontier_surfels_test_mapper_model)
+  target_link_libraries(frontier_surfels_test_mapper_model PRIVATE rapidcheck)
+endif()
+
 if(TARGET frontier_surfels_test_pcl)
   target_include_directories(frontier_surfels_test_pcl SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
   target_link_libraries(frontier_surfels_test_pcl PRIVATE ${PCL_LIBRARIES} ${PCL_IO_LIBRARY})
@@ -75,12 +85,15 @@ if(NOT FRONTIER_SURFELS_TOOLS)
 endif()
 
 # The programs as a user calls them. /usr/bin/python3 is the Python that has the report's modules.
-add_test(NAME test_replay_score
-  COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_replay_score.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
+foreach(name test_replay_score test_replay_failures)
+  add_test(NAME ${name}
+    COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/${name}.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
+endforeach()
+add_test(NAME test_report_page COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/test_report_page.py)
 add_test(NAME test_bench
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_bench.py $<TARGET_FILE:bench> $<TARGET_FILE:make_synthetic>
     ${PROJECT_SOURCE_DIR}/scripts/bench_table)
-set_tests_properties(test_replay_score test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+set_tests_properties(test_replay_score test_replay_failures test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
 
 if(FRONTIER_SURFELS_WITH_ROS)
   include(cmake/ros_tests.cmake)

@@ -36,7 +36,8 @@ target_link_libraries(frontier_surfels_replay
   PUBLIC frontier_surfels_scoring ${OpenCV_LIBS} nlohmann_json::nlohmann_json
   PRIVATE CLI11::CLI11 Threads::Threads)
 file(RELATIVE_PATH SCRIPTS_FROM_BINARY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}/scripts)
-target_compile_definitions(frontier_surfels_replay PRIVATE FRONTIER_SURFELS_SCRIPTS_FROM_BINARY="${SCRIPTS_FROM_BINARY}")
+target_compile_definitions(frontier_surfels_replay PRIVATE 
+  FRONTIER_SURFELS_SCRIPTS_FROM_BINARY="${SCRIPTS_FROM_BINARY}" FRONTIER_SURFELS_VERSION="${PROJECT_VERSION}")
 if(FRONTIER_SURFELS_WITH_ROS)
   target_compile_definitions(frontier_surfels_replay PUBLIC FRONTIER_SURFELS_WITH_ROS)
   target_link_libraries(frontier_surfels_replay PUBLIC frontier_surfels_ros)

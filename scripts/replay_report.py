@@ -1,10 +1,16 @@
 #!/usr/bin/python3
 """Makes DIR/report.html, a self-contained page, from the files that replay_score has written to DIR."""
-import base64
-import io
-import json
-import os
-import sys
+import signal
+
+# Ctrl-C ends this program without a traceback, also while modules are imported. replay_score starts it with SIGINT blocked.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+import base64  # noqa: E402
+import io  # noqa: E402
+import json  # noqa: E402
+import os  # noqa: E402
+import sys  # noqa: E402
 
 try:
     import jinja2
@@ -74,22 +80,47 @@ def headlines(summary):
             (percent(exact['miss_2cm']), 'missed', 'of the exact boundary: there is no surfel within 2 cm.')]
     if 'octomap' in summary:
         octomap = summary['octomap']
-        ratio = octomap['time_ms']['median'] / time['median'] if time['median'] else None
-        result.append((f'{number(ratio)} ×', 'as fast as OctoMap', f"with voxels of {1000 * octomap['resolution']:g} mm on the same "
-                       'frames: ratio of the medians. The time of OctoMap does not include the search for its boundary.'))
+        ratio, what = speed_ratio(summary)
+        result.append((f'{number(ratio)} ×', 'as fast as OctoMap', f"{what}, ratio of the medians. OctoMap: insertPointCloud, voxels of "
+                       f"{millimetres(octomap['resolution'])}, the same frames, without the search for its boundary."))
     return result
+
+
+def speed_ratio(summary):
+    """How many times as long OctoMap takes, and what is compared. A mapper in another process has no CPU time here."""
+    ours, octomap = summary['time_ms'], summary['octomap']['time_ms']
+    what = 'Wall time against wall time'
+    if 'cpu_ms' in summary:
+        ours, octomap = summary['cpu_ms'], summary['octomap']['cpu_ms']
+        what = "CPU time (OctoMap's one thread) against CPU time (all threads of this program)"
+    return octomap['median'] / ours['median'] if ours['median'] else None, what
+
+
+def millimetres(metres):
+    return f'{1000 * metres:.3g} mm'
+
+
+def has_gaps(octomap):
+    """Whether neighbouring rays may be further apart than OctoMap's voxels."""
+    return octomap['resolution'] < 0.999 * octomap['pixel_spacing']
+
+
+def table(head, rows):
+    """A table for the page, without the columns that have no value at all."""
+    kept = [n for n in range(len(head)) if n == 0 or any(row[n] != NONE for row in rows)]
+    return {'head': [head[n] for n in kept], 'rows': [[row[n] for n in kept] for row in rows]}
 
 
 def accuracy_rows(summary):
     octomap = summary.get('octomap')
     if octomap is None:
         return []
-    return [('Surfels of the map, |Ψ|', number(summary['surfels']['total'])),
-            ("Boundary of OctoMap, |M|", number(octomap['surfels'])),
-            ('False surfels: no M within 5 cm', number(octomap['fp'])),
-            ('Missing surfels: no Ψ within 5 cm', number(octomap['fn'])),
-            ('FDR: false, of Ψ', percent(octomap['fdr'])),
-            ('FOR: missing, of M', percent(octomap['for']))]
+    return [('Surfels of this map, |Ψ|', number(summary['surfels']['total'])),
+            ("Surfels of OctoMap's boundary, |M|", number(octomap['surfels'])),
+            ('False: of Ψ, no M within 5 cm', number(octomap['fp'])),
+            ('Missing: of M, no Ψ within 5 cm', number(octomap['fn'])),
+            ('FDR (false discovery rate): false / |Ψ|', percent(octomap['fdr'])),
+            ('FOR (false omission rate): missing / |M|', percent(octomap['for']))]
 
 
 def time_rows(summary):
@@ -120,7 +151,7 @@ def memory_rows(summary, bytes_per_surfel):
             ('Device, with the map [MB]', number(memory['device']), NONE),
             ('Process at its largest, with OctoMap and exact test [MB]', number(memory['peak_rss']), NONE)]
     if 'octomap' in summary:
-        rows.append((f"OctoMap of {1000 * summary['octomap']['resolution']:g} mm [MB]", number(summary['octomap']['memory_mb']), NONE))
+        rows.append((f"OctoMap of {millimetres(summary['octomap']['resolution'])} [MB]", number(summary['octomap']['memory_mb']), NONE))
     return rows
 
 
@@ -161,10 +192,10 @@ def pictures(folder):
             continue
         splats = surfel_pictures.splats_of(vertices, marked)
         outside = outside or surfel_pictures.outside_camera(rotations, splats.position)
-        red = '; red: errors of the exact test' if marked is not None else ''
-        result += [(f'{title} from outside. Surfels that face away are left out; orange: path of the camera{red}.',
+        magenta = '; magenta: errors of the exact test' if marked is not None else ''
+        result += [(f'{title} from outside. Surfels that face away are left out; orange: path of the camera{magenta}.',
                     png(surfel_pictures.render(surfel_pictures.joined(splats, path), outside))),
-                   (f'{title} from inside, from a little behind the camera in the middle of the recording{red}.',
+                   (f'{title} from inside, from a little behind the camera in the middle of the recording{magenta}.',
                     png(surfel_pictures.render(splats, inside)))]
     return result
 
@@ -181,7 +212,7 @@ def sweep_plot(folder, summary):
 def page(folder):
     summary = read_json(os.path.join(folder, 'summary.json'))
     frames = read_frames(os.path.join(folder, 'frames.csv'))
-    surfels = summary['surfels']
+    surfels, octomap = summary['surfels'], summary.get('octomap')
     bytes_per_surfel = surfels['map_bytes'] / surfels['total'] if surfels['total'] else 0
     loader = jinja2.FileSystemLoader(TEMPLATE_FOLDERS)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, autoescape=True, trim_blocks=True,
@@ -189,11 +220,28 @@ def page(folder):
     template = environment.get_template('report.html.j2')
     return template.render(
         name=os.path.basename(os.path.normpath(summary['input']['path'])), summary=summary, headlines=headlines(summary),
-        accuracy=accuracy_rows(summary), times=time_rows(summary), stages=stage_rows(summary),
-        memory=memory_rows(summary, bytes_per_surfel), exact=exact_rows(summary), pictures=pictures(folder),
+        accuracy=table(['', 'here'], accuracy_rows(summary)),
+        times=table(['', 'here', 'OctoMap', 'paper, CPU', 'paper, GPU'], time_rows(summary)),
+        stages=table(['', 'mean', 'median', 'share', 'paper, CPU', 'paper, GPU'], stage_rows(summary)),
+        memory=table(['', 'here', 'paper'], memory_rows(summary, bytes_per_surfel)), exact=exact_rows(summary), pictures=pictures(folder),
+        gaps=octomap is not None and has_gaps(octomap), millimetres=millimetres,
         sweep=sweep_plot(folder, summary),
         time_plot=embedded('image/svg+xml', report_plots.time_per_frame(frames, list(summary['time_ms']['stages']))),
         map_plot=embedded('image/svg+xml', report_plots.map_per_frame(frames, bytes_per_surfel)))
+
+
+def write_page(path, html):
+    """Writes the page beside an earlier one and replaces that only when the new one is complete."""
+    unfinished = path + '.unfinished'
+    try:
+        with open(unfinished, 'w', encoding='utf-8') as file:
+            file.write(html)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    finally:
+        if os.path.exists(unfinished):
+            os.remove(unfinished)
 
 
 def main():
@@ -202,9 +250,7 @@ def main():
         return 2
     folder = sys.argv[1]
     try:
-        html = page(folder)
-        with open(os.path.join(folder, 'report.html'), 'w', encoding='utf-8') as file:
-            file.write(html)
+        write_page(os.path.join(folder, 'report.html'), page(folder))
     except (OSError, ValueError, KeyError, jinja2.TemplateError) as error:
         print(f"replay_report: the report of '{folder}' could not be made: {type(error).__name__}: {error}", file=sys.stderr)
         return 1

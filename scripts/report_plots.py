@@ -10,6 +10,7 @@ STAGE_COLORS = ['#4e79a7', '#a0cbe8', '#f28e2b', '#ffbe7d', '#59a14f', '#8cd17d'
 TOTAL = '#222222'
 OCTOMAP = '#c0392b'
 FRONTIER = '#4080e0'
+WARM_UP_FRAMES, FEW_FRAMES = 5, 10
 
 pyplot.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True, 'grid.color': '#e6e6e6',
                         'axes.axisbelow': True, 'axes.edgecolor': '#888888', 'legend.frameon': False, 'svg.hashsalt': 'frontier_surfels'})
@@ -27,13 +28,23 @@ def panels(count):
     return figure, axes
 
 
+def warm(frames):
+    """The frames whose times count, as in summary.json: all but the first five, or all if there are no more than ten."""
+    return frames[WARM_UP_FRAMES:] if len(frames) > FEW_FRAMES else frames
+
+
+def top_of_stages(frames):
+    """Upper end of an axis on which the frames that count fill the height: the first ones take many times as long."""
+    return 1.05 * max(warm(frames)['total'].max(), 1e-3)
+
+
 def time_per_frame(frames, stages):
     """Times per frame. `frames`: table of frames.csv; `stages`: names of its columns with the times of stages, in their order."""
     figure, (stacked, beside) = panels(2)
     index = range(len(frames))
     stacked.stackplot(index, [frames[name] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)
     stacked.plot(index, frames['total'], color=TOTAL, linewidth=0.8, label='total (wall)')
-    stacked.set(xlabel='frame', ylabel='time [ms]', title='Stages', xlim=(0, max(len(frames) - 1, 1)), ylim=(0, None))
+    stacked.set(xlabel='frame', ylabel='time [ms]', title='Stages', xlim=(0, max(len(frames) - 1, 1)), ylim=(0, top_of_stages(frames)))
     handles, labels = stacked.get_legend_handles_labels()
     stacked.legend(handles[::-1], labels[::-1], fontsize=7, loc='center left', bbox_to_anchor=(1, 0.5), handlelength=1)
 
@@ -52,8 +63,9 @@ def map_per_frame(frames, bytes_per_surfel):
     index = range(len(frames))
     size.plot(index, frames['surfels'] / 1e6, color=TOTAL, linewidth=1.2)
     size.set(xlabel='frame', ylabel='surfels [million]', title='Map', xlim=(0, max(len(frames) - 1, 1)), ylim=(0, None))
-    memory = size.secondary_yaxis('right', functions=(lambda n: n * bytes_per_surfel, lambda mb: mb / max(bytes_per_surfel, 1e-9)))
-    memory.set_ylabel(f'memory [MB] at {bytes_per_surfel:.1f} bytes a surfel')
+    if bytes_per_surfel > 0:
+        memory = size.secondary_yaxis('right', functions=(lambda n: n * bytes_per_surfel, lambda mb: mb / bytes_per_surfel))
+        memory.set_ylabel(f'memory [MB] at {bytes_per_surfel:.1f} bytes a surfel')
 
     change.plot(index, frames['created'] / 1e3, color=FRONTIER, linewidth=0.9, label='created')
     change.plot(index, frames['removed'] / 1e3, color=OCTOMAP, linewidth=0.9, label='removed')

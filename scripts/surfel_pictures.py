@@ -5,7 +5,7 @@ import numpy
 
 OCCUPIED = (0.80, 0.78, 0.74)  # of occupied surfels without a colour
 FRONTIER = (0.25, 0.50, 0.88)
-ERROR = (0.85, 0.13, 0.13)
+ERROR = (1.00, 0.00, 1.00)  # magenta: no scene has it
 PATH = (1.00, 0.60, 0.05)
 
 SIZE = (900, 600)  # [pixel] width and height of the report's pictures
@@ -43,7 +43,7 @@ def columns(vertices, names):
 
 
 def splats_of(vertices, wrong=None):
-    """Splats of a map: occupied surfels in their colour or grey, frontier blue, and surfels with a mark in `wrong` red."""
+    """Splats of a map: occupied surfels in their colour or grey, frontier blue, and surfels with a mark in `wrong` magenta."""
     color = columns(vertices, ('red', 'green', 'blue')) / 255
     color[(color == 0).all(axis=1)] = OCCUPIED
     color[vertices['label'] == 0] = FRONTIER

@@ -9,6 +9,8 @@
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
+#include "frontier_surfels/paths.hpp"
+#include "map/change_readers.hpp"
 #include "map/seen_fill.hpp"
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
@@ -35,7 +37,9 @@ Config checked(const Config& config) {
   std::string all;
   for (const auto& problem : problems) all += (all.empty() ? "" : "\n") + problem;
   if (!all.empty()) throw Error(all);
-  return config;
+  Config checked = config;
+  checked.map_folder = absolute_path(config.map_folder);
+  return checked;
 }
 
 /// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
@@ -74,12 +78,14 @@ struct Mapper::Impl {
     load_views(archive->stored_views());
   }
 
+  void begin_call();
   Report integrate(const DepthFrame& input);
+  Report update(const DepthFrame& input);
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
-  void finish_pages(std::uint32_t number);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
-  void finish_frame(Report& report);
+  void finish_frame(std::uint32_t number, Report& report);
+  Changes changes(std::uint64_t since);
   void begin_map(const SavedMap& saved);
   void load_views(const std::vector<SavedView>& saved);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
@@ -105,10 +111,10 @@ struct Mapper::Impl {
   Remembering remembering;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
+  ChangeReaders readers;
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
-  std::uint32_t unfinished = 0;       ///< number of the frame at hand, or of a frame that failed half way; 0: none
-  bool pages_changed = false;         ///< by a failed frame or by the archive, since the last finished frame
+  bool pages_changed = false;         ///< by the archive, since the last frame
 };
 
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
@@ -120,7 +126,27 @@ Report Mapper::integrate(const DepthFrame& frame) {
   return on_device([&] { return impl_->integrate(frame); });
 }
 
+/// What each call that uses the map begins with. It forgets the times of earlier calls, which would pile up without frames, and undoes a
+/// failed frame that could not be undone at once.
+void Mapper::Impl::begin_call() {
+  commands.forget_times();
+  map.roll_back();
+}
+
+/// All or nothing.
 Report Mapper::Impl::integrate(const DepthFrame& input) {
+  try {
+    return update(input);
+  } catch (const std::exception&) {
+    try {
+      map.roll_back();
+    } catch (const std::exception&) {  // the next call tries again
+    }
+    throw;
+  }
+}
+
+Report Mapper::Impl::update(const DepthFrame& input) {
   const auto start = Clock::now();
   Report report;
   report.stamp = input.stamp;
@@ -128,7 +154,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   const auto number = static_cast<std::uint32_t>(report.sequence);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(input, config);
+  const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
   Camera& camera = cameras.find(image.intrinsics);
   const Frame frame = begin_frame(image, input.T_world_camera, camera, number);
 
@@ -159,7 +185,7 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
     known = &known_space->compute(frame, visit.in_view(), candidates, map);
   }
 
-  // New surfel filter - 3.5. The frame may fail up to here: device memory for the rest is reserved now
+  // New surfel filter - 3.5. The map's own memory is enlarged before anything is removed
   report.created = creation.filter(frame, list, candidates, known);
   map.reserve(report.created);
 
@@ -171,22 +197,16 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  finish_frame(report);
+  finish_frame(number, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
-  commands.forget_times();  // a frame that failed half way has left some
-  frame_on_device = 0;
-  if (unfinished != 0) {  // the failed frame may have split surfels, or marked some as changed
-    pages_changed = true;
-    finish_pages(unfinished);
-    unfinished = 0;
-  }
+  begin_call();
+  if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
-  unfinished = number;
   camera.set_image(image);
   views.set_current(image, T_world_camera);
   seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : kSeenSpacing * camera.grid().delta_min);
@@ -200,32 +220,32 @@ SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera&
   return visit.visit(frame, camera, observed.bits(), observed.column_end(), views, map, candidates);
 }
 
-void Mapper::Impl::finish_pages(std::uint32_t number) {
-  const std::vector<BlockKey> shrunk = map.finish_frame("labels", number);
-  if (archive) archive->note_changed(shrunk);
-}
-
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
 void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number) {
   bool changed = std::exchange(pages_changed, true);  // stays true if something throws
+  const std::uint64_t exact = std::exchange(frame_on_device, 0);
   const auto reach = [&] { return map.window_reach(camera.grid(), T_world_camera) + KnownHull::kReach * config.z_max; };
   while (archive->follow(T_world_camera.translation(), reach(), number)) changed = true;
   pages_changed = changed;
+  if (!changed) frame_on_device = exact;
 }
 
-void Mapper::Impl::finish_frame(Report& report) {
-  finish_pages(unfinished);
+void Mapper::Impl::finish_frame(std::uint32_t number, Report& report) {
+  map.finish_frame("labels", number);
+  report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
+  const std::vector<BlockKey> shrunk = map.commit(number);
   report.view_kept = views.keep_current();
+  sequence = report.sequence;
+  frame_on_device = pages_changed ? 0 : sequence;
+  pages_changed = false;
   if (config.seen_points && views.forgotten()) {
     const std::vector<BlockKey> changed = remembering.remember(*views.forgotten(), views, map.block_size(), seen);
     if (archive) archive->note_changed(changed);
   }
-  if (archive) archive->save_some(unfinished);
-  report.stages = commands.take_times();
-  unfinished = 0;
-  sequence = report.sequence;
-  frame_on_device = pages_changed ? 0 : sequence;
-  pages_changed = false;
+  if (archive) {
+    archive->note_changed(shrunk);
+    archive->save_some(number);
+  }
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.seen_bytes = seen.bytes();
@@ -233,7 +253,10 @@ void Mapper::Impl::finish_frame(Report& report) {
 }
 
 std::vector<Surfel> Mapper::surfels() const {
-  return on_device([&] { return impl_->map.download(); });
+  return on_device([&] {
+    impl_->begin_call();
+    return impl_->map.download();
+  });
 }
 
 std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const {
@@ -244,15 +267,33 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 }
 
 Changes Mapper::changes(std::uint64_t since) const {
+  return on_device([&] { return impl_->changes(since); });
+}
+
+Changes Mapper::Impl::changes(std::uint64_t since) {
+  begin_call();
+  const bool given_again = since != 0 && !readers.knows(since);
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
-  const bool last_frame = impl_->frame_on_device == impl_->sequence && since + 1 == impl_->sequence;
-  Changes changes = on_device([&] { return last_frame ? impl_->map.last_changes() : impl_->map.changes(since); });
-  changes.sequence = impl_->sequence;
+  const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
+  Changes changes = last_frame ? map.last_changes() : map.changes(since, given_again);
+  changes.sequence = sequence;
+  ChangeReaders told = readers;
+  told.note(since, sequence);
+  map.reserve_ids(told.slowest());
+  readers = told;  // nothing has failed: the reader gets the changes
   return changes;
+}
+
+std::vector<Surfel> Mapper::whole_map() const {
+  SavedMap map;
+  map.surfels = surfels();
+  if (impl_->archive) impl_->archive->add_stored(map);
+  return std::move(map.surfels);
 }
 
 SavedMap Mapper::saved_map() const {
   SavedMap map = on_device([&] {
+    impl_->begin_call();
     SavedMap map = {impl_->map.download(), impl_->seen.saved(), {}};
     for (const std::uint64_t number : impl_->views.numbers()) map.views.push_back(impl_->views.saved(number));
     return map;
@@ -262,6 +303,16 @@ SavedMap Mapper::saved_map() const {
 }
 
 void Mapper::save(const std::string& path) const { write_map(path, saved_map()); }
+
+void Mapper::flush() {
+  if (!impl_->archive) return;
+  on_device([&] {
+    impl_->commands.forget_times();
+    impl_->archive->flush(static_cast<std::uint32_t>(impl_->sequence));
+  });
+}
+
+std::string Mapper::map_folder_fault() const { return impl_->archive ? impl_->archive->fault() : ""; }
 
 void Mapper::load(const std::string& path) {
   const SavedMap map = read_saved_map(path);
@@ -281,6 +332,7 @@ void Mapper::load(const SavedMap& map) {
 }
 
 void Mapper::Impl::begin_map(const SavedMap& saved) {
+  commands.forget_times();
   SeenSpace filled;
   const bool has_seen = saved.seen.points > 0 && saved.seen.block_size == map.block_size();
   if (config.seen_points && !has_seen) filled = fill_seen(saved.surfels, map.block_size(), shift_for(saved.surfels, map.block_size()));

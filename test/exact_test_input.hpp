@@ -6,12 +6,22 @@
 #include <cstring>
 #include <vector>
 
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
 
 using Eigen::Vector3d;
 using Encoding = DepthImage::Encoding;
+
+/// The default configuration with another depth range [m] and decimation.
+inline Config reading(double z_min, double z_max, int decimation) {
+  Config config;
+  config.z_min = z_min;
+  config.z_max = z_max;
+  config.decimation = decimation;
+  return config;
+}
 
 /// A depth frame that owns its image's bytes, laid out as a driver would deliver them.
 struct OwnedFrame {
@@ -26,7 +36,7 @@ struct OwnedFrame {
     bytes.assign(frame.depth.step * camera.height, 0xA5);
   }
 
-  static std::size_t pixel_size(Encoding encoding) { return encoding == Encoding::kMillimetresU16 ? 2 : 4; }
+  static std::size_t pixel_size(Encoding encoding) { return encoding == Encoding::kStepsU16 ? 2 : 4; }
 
   void set(int column, int row, double metres) {
     const std::size_t size = pixel_size(frame.depth.encoding);

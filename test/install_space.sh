@@ -94,7 +94,7 @@ files = glob.glob(os.path.join(folder, "launch/*.launch"))
 assert files, "no launch file is installed"
 for name in files:
     fault = rlutil.check_roslaunch(name)
-    assert not fault or "requires the 'bag' arg" in fault, fault
+    assert not fault or "requires the 'bag' arg" in fault or "arg 'bag' is not defined" in fault, fault
 PYTHON
     rosmsg show frontier_surfels/SurfelUpdate >/dev/null || fail "the messages are not installed"
     ! ldd "$programs/mapper_node" "$prefix/lib/libfrontier_surfels_ros.so" | grep "not found" || fail "the node's libraries are not found"

@@ -80,9 +80,34 @@ inline std::vector<Surfel> map_of(const Frames& frames, const Config& config) {
 }
 
 inline scoring::ExactScore score(const std::vector<Surfel>& surfels, const Frames& frames, const Config& config) {
-  scoring::ExactTest exact(config.z_min, config.z_max, config.decimation);
+  scoring::ExactTest exact(config);
   for (const auto& frame : frames) exact.add(frame.view());
   return exact.score(surfels);
+}
+
+/// Shares of errors in a score of the exact test.
+struct Errors {
+  double not_right = 0, beyond_2v = 0, fdr_5cm = 0, miss_2cm = 0, miss_5cm = 0, wrong_label = 0;
+};
+
+inline Errors errors_of(const scoring::ExactScore& s) {
+  return {1 - s.right, 1 - s.within_2v, s.fdr_5cm, s.miss_2cm, s.miss_5cm, 1 - s.label_ok};
+}
+
+/// Expects errors of at most twice the shares that were reached when the test was written. 1e-4 more, a few surfels, is always allowed.
+/// @param at_least  part of these shares below which the test is no longer about what its name says
+inline void expect_errors(const scoring::ExactScore& s, const Errors& reached, double at_least = 0) {
+  const Errors now = errors_of(s);
+  const auto expect = [at_least](const char* what, double share, double then) {
+    EXPECT_LE(share, 2 * then + 1e-4) << what;
+    EXPECT_GE(share, at_least * then - 1e-4) << what << ": if the map has become better, lower the figure in the test";
+  };
+  expect("surfels that are not right", now.not_right, reached.not_right);
+  expect("surfels more than 2 voxels off", now.beyond_2v, reached.beyond_2v);
+  expect("surfels more than 5 cm off", now.fdr_5cm, reached.fdr_5cm);
+  expect("boundary without a surfel within 2 cm", now.miss_2cm, reached.miss_2cm);
+  expect("boundary without a surfel within 5 cm", now.miss_5cm, reached.miss_5cm);
+  expect("wrong labels", now.wrong_label, reached.wrong_label);
 }
 
 inline std::string text(const scoring::ExactScore& s, std::size_t surfels) {

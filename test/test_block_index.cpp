@@ -66,16 +66,41 @@ TEST(BlockIndex, RemovesOnlyPagesOfTheBlock) {
 }
 
 /// Pages of a replaced map become free. The lowest is used first, as in a new map.
-TEST(BlockIndex, SkipsToPagesUsedBefore) {
-  BlockIndex index;
-  index.add_page({0, 0, 0});
-  index.skip_to(4);
+TEST(BlockIndex, EmptiedUsesThePagesAgain) {
+  BlockIndex before;
+  for (int n = 0; n < 4; ++n) before.add_page({n % 2, 0, 0});
+  before.remove_page({0, 0, 0}, 2, 7);
+  BlockIndex index = before.emptied(0);
+  EXPECT_TRUE(index.blocks().empty());
   EXPECT_EQ(index.end(), 4u);
+  EXPECT_EQ(index.used(), 0u);
+  for (const std::uint32_t page : {0u, 1u, 2u, 3u, 4u}) EXPECT_EQ(index.add_page({1, 0, 0}), page);
+}
+
+TEST(BlockIndex, RemovedPagesWaitForTheirRelease) {
+  BlockIndex index;
+  for (int n = 0; n < 4; ++n) index.add_page({0, 0, 0});
+  index.remove_page({0, 0, 0}, 1, 5);
+  index.remove_page({0, 0, 0}, 2, 6);
+  index.remove_page({0, 0, 0}, 3);
   EXPECT_EQ(index.used(), 1u);
-  for (const std::uint32_t page : {1u, 2u, 3u, 4u}) EXPECT_EQ(index.add_page({1, 0, 0}), page);
-  index.skip_to(2);
-  EXPECT_EQ(index.end(), 5u) << "end() never decreases";
-  EXPECT_EQ(index.used(), 5u);
+  EXPECT_EQ(index.add_page({1, 0, 0}), 3u);
+  index.release(4);
+  EXPECT_EQ(index.add_page({1, 0, 0}), 4u);
+  index.release(5);
+  EXPECT_EQ(index.add_page({1, 0, 0}), 1u);
+  EXPECT_EQ(index.add_page({1, 0, 0}), 5u);
+
+  BlockIndex empty = index.emptied(8);
+  EXPECT_EQ(empty.used(), 0u);
+  EXPECT_EQ(empty.end(), 6u);
+  EXPECT_EQ(empty.add_page({1, 0, 0}), 6u) << "all pages wait";
+  empty.release(6);
+  EXPECT_EQ(empty.add_page({1, 0, 0}), 2u);
+  empty.release(8);
+  std::set<std::uint32_t> left;
+  for (int n = 0; n < 5; ++n) left.insert(empty.add_page({1, 0, 0}));
+  EXPECT_EQ(left, (std::set<std::uint32_t>{0, 1, 3, 4, 5}));
 }
 
 TEST(BlockIndex, AgreesWithASimpleBookOfPages) {

@@ -56,16 +56,5 @@ TEST(Cameras, NumberIsBounded) {
   EXPECT_EQ(test_commands().allocated_bytes(), after_many);
 }
 
-TEST(Cameras, ARefusedCameraIsForgotten) {
-  const CameraSetup setup = cameras().front();
-  Cameras list(test_commands(), setup.config);
-  Intrinsics absurd = setup.intrinsics;
-  absurd.fx = absurd.fy = 1e7;
-  const std::size_t bytes = test_commands().allocated_bytes();
-  for (int n = 0; n < 3; ++n) EXPECT_THROW(list.find(absurd), BadFrame);
-  EXPECT_EQ(test_commands().allocated_bytes(), bytes);
-  EXPECT_TRUE(same_camera(list.find(setup.intrinsics).intrinsics(), setup.intrinsics));
-}
-
 }  // namespace
 }  // namespace frontier_surfels

@@ -168,6 +168,8 @@ TEST_F(ConfigFile, ReadsOverTheDefaults) {
   EXPECT_EQ(loaded_.platform, "pocl");
   EXPECT_TRUE(loaded_.carve_no_return);
   EXPECT_EQ(loaded_.z_min, Config().z_min);
+  EXPECT_EQ(fault("\xEF\xBB\xBFz_max: 4\n"), "") << "a byte order mark is no text";
+  EXPECT_EQ(loaded_.z_max, 4);
 }
 
 TEST_F(ConfigFile, EmptyMeansDefaults) {

@@ -26,11 +26,11 @@ const Vector3d kSideInward(1, 0, kSide);            // normal of the left side, 
 const Vector3d kTowards(0, 0, -1), kAway(0, 0, 1);  // towards the camera, away from it
 
 ExactTest step_scene() {
-  OwnedFrame frame({100, 100, 79.5, 59.5, 160, 120}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 6, false);
+  OwnedFrame frame({100, 100, 79.5, 59.5, 160, 120}, Eigen::Isometry3d::Identity(), Encoding::kStepsU16, 6, false);
   for (int t = 0; t < 120; ++t) {
     for (int s = 0; s < 160; ++s) frame.set(s, t, s < 80 ? kLeft : kRight);
   }
-  ExactTest test(0.5, 3, 1);
+  ExactTest test(reading(0.5, 3, 1));
   test.add(frame.view());
   return test;
 }
@@ -98,18 +98,41 @@ TEST(ExactTest, DepthsOutsideTheRangeAreNoMeasurements) {
     for (int t = 0; t < 5; ++t) {
       for (int s = 0; s < 5; ++s) frame.set(s, t, depth);
     }
-    ExactTest test(depth == 0.7 ? 0.7 : 0.5, 1.3, 1);  // 0.7 is not a float: the limit itself must still be valid
+    ExactTest test(reading(depth == 0.7 ? 0.7 : 0.5, 1.3, 1));  // 0.7 is not a float: the limit itself must still be valid
     test.add(frame.view());
     EXPECT_EQ(test.known({0, 0, 0.3}), valid) << depth;
   }
 }
 
+/// A depth beyond the range, or none at all: known up to z_max if the configuration carves it, and never a surface.
+TEST(ExactTest, CarvesWhatTheConfigurationSays) {
+  for (const double depth : {1.8, kInf}) {
+    for (const bool carved : {false, true}) {
+      OwnedFrame frame({20, 20, 9.5, 9.5, 20, 20}, Eigen::Isometry3d::Identity(), Encoding::kMetresF32, 0, false);
+      for (int i = 0; i < 400; ++i) frame.set(i % 20, i / 20, depth);
+      Config config = reading(0.5, 1.3, 1);
+      config.carve_no_return = carved == std::isinf(depth);
+      config.carve_beyond_range = carved != std::isinf(depth);
+      ExactTest test(config);
+      test.add(frame.view());
+      SCOPED_TRACE(std::to_string(depth) + (carved ? ", carved" : ""));
+      EXPECT_EQ(test.known({0, 0, 1.299}), carved);
+      EXPECT_FALSE(test.known({0, 0, 1.301}));
+      const std::vector<BoundaryPoint> boundary = test.boundary(1000, ExactTest::kSeed);
+      EXPECT_EQ(boundary.size() > 100, carved);
+      for (const BoundaryPoint& point : boundary) EXPECT_FALSE(point.occupied);
+      const ExactScore score = test.score({make_surfel({0, 0, 1.3}, kTowards)}, 100);
+      EXPECT_EQ(score.right, carved ? 1 : 0);
+    }
+  }
+}
+
 TEST(ExactTest, DecimatesLikeTheMapper) {
-  OwnedFrame frame({100, 80, 3, 5, 11, 14}, Eigen::Isometry3d::Identity(), Encoding::kMillimetresU16, 3, true);
+  OwnedFrame frame({100, 80, 3, 5, 11, 14}, Eigen::Isometry3d::Identity(), Encoding::kStepsU16, 3, true);
   for (int t = 0; t < 14; t += 4) {
     for (int s = 0; s < 11; s += 4) frame.set(s, t, 1 + 0.1 * (s / 4) + 0.01 * (t / 4));
   }
-  ExactTest test(0.5, 3, 4);  // 2 x 3 pixels: column 8 and row 12 begin no whole block
+  ExactTest test(reading(0.5, 3, 4));  // 2 x 3 pixels: column 8 and row 12 begin no whole block
   test.add(frame.view());
   for (int t = 0; t < 4; ++t) {
     for (int s = 0; s < 3; ++s) {
@@ -200,11 +223,11 @@ TEST(ExactTest, FindsTheBoundaryOfTheScene) {
 
 /// Number of boundary points on the sheet of unknown space between two cameras that face each other.
 std::size_t points_on_sheet(double thickness) {
-  ExactTest test(0.5, 3, 1);
+  ExactTest test(reading(0.5, 3, 1));
   Eigen::Isometry3d facing(Eigen::Translation3d(0, 0, 2 + thickness));
   facing.rotate(Eigen::AngleAxisd(M_PI, Vector3d::UnitY()));
   for (const Eigen::Isometry3d& pose : {Eigen::Isometry3d::Identity(), facing}) {
-    OwnedFrame frame({15, 15, 14.5, 14.5, 30, 30}, pose, Encoding::kMillimetresU16, 0, false);
+    OwnedFrame frame({15, 15, 14.5, 14.5, 30, 30}, pose, Encoding::kStepsU16, 0, false);
     for (int i = 0; i < 900; ++i) frame.set(i % 30, i / 30, 1);
     test.add(frame.view());
   }
@@ -306,7 +329,7 @@ TEST(ExactTest, MissingWallIsMissed) {
 }
 
 TEST(ExactTest, EmptyInputHasDefinedScores) {
-  const ExactTest scene = step_scene(), no_frames(0.5, 3, 4);
+  const ExactTest scene = step_scene(), no_frames(reading(0.5, 3, 4));
   const ExactScore no_surfels = scene.score({}, 1000);
   EXPECT_EQ(no_surfels.right + no_surfels.buried + no_surfels.floating + no_surfels.flipped, 0);
   EXPECT_EQ(no_surfels.fdr_2cm + no_surfels.within_2v, 0);
@@ -322,7 +345,7 @@ TEST(ExactTest, EmptyInputHasDefinedScores) {
   EXPECT_EQ(unseen.miss_1cm, 0);
   EXPECT_EQ(no_frames.score({}, 1000).boundary_points, 0u);
 
-  ExactTest blind(0.5, 3, 1);
+  ExactTest blind(reading(0.5, 3, 1));
   OwnedFrame nothing({10, 10, 2, 2, 5, 5}, Eigen::Isometry3d::Identity(), Encoding::kMetresF32, 0, false);
   for (int i = 0; i < 25; ++i) nothing.set(i % 5, i / 5, kNan);
   blind.add(nothing.view());
@@ -335,7 +358,7 @@ TEST(ExactTest, RefusesFramesThatCannotBeUsed) {
     OwnedFrame frame({10, 10, 2, 2, 5, 5}, Eigen::Isometry3d::Identity(), Encoding::kMetresF32, 0, false);
     frame.view();
     spoil(frame.frame);
-    ExactTest test(0.5, 3, 1);
+    ExactTest test(reading(0.5, 3, 1));
     EXPECT_THROW(test.add(frame.frame), BadFrame);
     EXPECT_EQ(test.size(), 0u);
   };
@@ -347,9 +370,9 @@ TEST(ExactTest, RefusesFramesThatCannotBeUsed) {
   refused([](DepthFrame& f) { f.intrinsics.width = 4; });
   refused([](DepthFrame& f) { f.intrinsics.fy = 0; });
   refused([](DepthFrame& f) { f.intrinsics.cx = kNan; });
-  EXPECT_THROW(ExactTest(0, 3, 4), Error);
-  EXPECT_THROW(ExactTest(0.5, kNan, 4), Error);
-  EXPECT_THROW(ExactTest(0.5, 3, 0), Error);
+  EXPECT_THROW(ExactTest(reading(0, 3, 4)), Error);
+  EXPECT_THROW(ExactTest(reading(0.5, kNan, 4)), Error);
+  EXPECT_THROW(ExactTest(reading(0.5, 3, 0)), Error);
 }
 
 TEST(ExactTest, ProgressIsReportedOnTheCallersThreadAndCanStop) {

@@ -24,7 +24,7 @@ struct SlowView {
 struct RandomScene {
   static constexpr double kZMin = 0.4, kZMax = 2.5;
   static constexpr int kDecimation = 3;
-  ExactTest test{kZMin, kZMax, kDecimation};
+  ExactTest test{reading(kZMin, kZMax, kDecimation)};
   std::vector<SlowView> views;
   std::vector<Surfel> surfels;
 };
@@ -46,8 +46,7 @@ void add_random_view(RandomScene& scene, std::mt19937& random) {
       {90 + 20 * uniform(random), 130 + 20 * uniform(random), width / 2.0 + 5 * uniform(random), height / 2.0, width, height}, {}, {}};
   view.T_world_camera = Eigen::Translation3d(uniform(random), uniform(random), uniform(random)) *
                         Eigen::Quaterniond(uniform(random), uniform(random), uniform(random), uniform(random)).normalized();
-  OwnedFrame frame(view.camera, view.T_world_camera, index % 2 ? Encoding::kMetresF32 : Encoding::kMillimetresU16, index % 3 * 5,
-                   index % 4 > 1);
+  OwnedFrame frame(view.camera, view.T_world_camera, index % 2 ? Encoding::kMetresF32 : Encoding::kStepsU16, index % 3 * 5, index % 4 > 1);
   for (int t = 0; t < height; ++t) {
     for (int s = 0; s < width; ++s) {
       const double depth = random_depth(random, s, t, index % 3 == 0 ? 0.3 : 0.001 * (index % 3 - 1));

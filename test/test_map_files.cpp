@@ -146,6 +146,17 @@ TEST_P(MapFiles, WriteErrorsNameThePathAndTheReason) {
   EXPECT_TRUE(S_ISCHR(status.st_mode)) << "a device was replaced by a file";
 }
 
+TEST_P(MapFiles, NamesMayBeAsLongAsTheFileSystemTakes) {
+  const std::string longest = (folder_ / (std::string(255 - ending_.size(), 'm') + ending_)).string();
+  write_map(longest, some_surfels(3));
+  EXPECT_EQ(read_map(longest).size(), 3u);
+  const std::string longer = (folder_ / (std::string(300, 'm') + ending_)).string();
+  const std::string reason = "a file system takes no name as long as that (most take 255 bytes); give a shorter one.";
+  EXPECT_EQ(write_fault(longer, some_surfels(3)), "The map cannot be written to " + longer + ": " + reason);
+  EXPECT_EQ(file_fault([&] { read_map(longer); }), "The map " + longer + " cannot be read: " + reason);
+  EXPECT_EQ(files(), 1u);
+}
+
 TEST_P(MapFiles, FailureHalfWayKeepsTheOldFile) {
   const std::vector<Surfel> old = some_surfels(10);
   write_map(path_, old);

@@ -119,6 +119,51 @@ TEST_F(MapperArchive, AFullDiskRefusesFramesAndLosesNothing) {
   std::cout << refused << " of " << frames.size() << " frames refused: " << said << "\n";
 }
 
+/// The destructor could tell nobody.
+TEST_F(MapperArchive, FlushTellsThatTheEndOfTheMapCannotBeWritten) {
+  const Frames frames = walk_there(5);
+  Mapper plain(walking());
+  integrate_all(plain, frames);
+  std::signal(SIGXFSZ, SIG_IGN);  // write() then fails
+  {
+    Mapper mapper(walking(path_));
+    integrate_all(mapper, frames);
+    limit_file_size(true, 4096);
+    for (int tries = 0; tries < 3; ++tries) {
+      const std::string said = fault_of<FileError>([&] { mapper.flush(); });
+      EXPECT_TRUE(contains(said, "The map folder " + path_ + " cannot be") && said.back() == '.') << said;
+      EXPECT_EQ(mapper.map_folder_fault(), said);
+    }
+    EXPECT_TRUE(same(sorted(mapper.whole_map()), sorted(plain.surfels())));
+    limit_file_size(false);
+    mapper.flush();
+    EXPECT_EQ(mapper.map_folder_fault(), "");
+    std::string copy = path_ + "_copy";
+    std::filesystem::copy(path_, copy);
+    path_.swap(copy);
+    EXPECT_TRUE(same(stored(), sorted(plain.surfels()))) << "all is on disk before the mapper ends";
+    path_.swap(copy);
+    EXPECT_NO_THROW(mapper.integrate(frames.back().view())) << "the fault is over";
+  }
+  std::signal(SIGXFSZ, SIG_DFL);
+  Mapper without(walking());
+  EXPECT_NO_THROW(without.flush());
+  EXPECT_EQ(without.map_folder_fault(), "");
+}
+
+TEST_F(MapperArchive, ADeletedFolderIsTold) {
+  const Frames frames = walk_there(12);
+  Mapper mapper(walking(path_));
+  mapper.integrate(frames[0].view());
+  mapper.flush();
+  std::filesystem::remove_all(path_);
+  std::string said;
+  for (std::size_t n = 1; n < frames.size() && said.empty(); ++n) said = fault_of<FileError>([&] { mapper.integrate(frames[n].view()); });
+  EXPECT_TRUE(contains(said, "has been deleted, moved or replaced")) << said;
+  said = fault_of<FileError>([&] { mapper.flush(); });
+  EXPECT_TRUE(contains(said, "has been deleted, moved or replaced")) << said;
+}
+
 /// Some blocks enter memory, then one cannot be read: the frame is refused, and changes() reports the blocks that have entered.
 TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   const Frames there = walk_there(20), all = walk_there_and_back(20);

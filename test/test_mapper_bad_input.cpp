@@ -3,7 +3,9 @@
 
 #include <functional>
 
+#include "frame/view_grid.hpp"
 #include "mapper_input.hpp"
+#include "replay/run.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -140,6 +142,58 @@ TEST(MapperBadInput, AGridTooLargeIsRefused) {
   EXPECT_TRUE(contains(said, "z_max")) << said;
   EXPECT_TRUE(mapper.surfels().empty());
   EXPECT_GT(mapper.integrate(plane_frame(plain_camera(12, 9, 10), 1).view()).created, 0u);
+}
+
+/// The sentence with which an image of this size is refused. Its pixels are not there: nobody may read them, nor ask for memory for them.
+std::string refusal(Mapper& mapper, int width, int height, double f) {
+  const std::uint16_t pixel = 1000;
+  DepthFrame frame;
+  frame.intrinsics = {f, f, width / 2.0, height / 2.0, width, height};
+  frame.depth = {width, height, std::size_t{2} * width, DepthImage::Encoding::kStepsU16, &pixel, false};
+  frame.T_world_camera = Eigen::Isometry3d::Identity();
+  return fault_of<BadFrame>([&] { mapper.integrate(frame); });
+}
+
+TEST(MapperBadInput, ImagesTooLargeAreRefusedWithTheDecimationThatWouldDo) {
+  Mapper mapper(undecimated());
+  const std::size_t device_before = mapper.statistics().device_bytes;
+  const double peak_before_mb = replay::peak_rss_mb();
+  const struct {
+    int width, height;
+    double f;
+  } cameras[] = {{16384, 16384, 2000}, {65536, 4000, 3000}, {4000, 3000, 3000}, {1 << 20, 64, 100}};
+  for (const auto& camera : cameras) {
+    const std::string said = refusal(mapper, camera.width, camera.height, camera.f);
+    const std::size_t at = said.find("Set decimation to ");
+    ASSERT_NE(at, std::string::npos) << said;
+    EXPECT_TRUE(contains(said, std::to_string(camera.width) + " x " + std::to_string(camera.height))) << said;
+    const int decimation = std::stoi(said.substr(at + 18));
+    const Intrinsics full = {camera.f, camera.f, 0, 0, camera.width, camera.height};
+    Config config = undecimated();
+    config.decimation = decimation;
+    EXPECT_NO_THROW(check_grid_size(full, config, kMaxVoxels)) << said;
+    config.decimation = decimation - 1;
+    EXPECT_THROW(check_grid_size(full, config, kMaxVoxels), BadFrame) << said;
+  }
+  EXPECT_TRUE(contains(refusal(mapper, 1900000, 1900000, 1e3), "No decimation would do"));
+  EXPECT_EQ(mapper.statistics().device_bytes, device_before);
+  EXPECT_LT(replay::peak_rss_mb(), peak_before_mb + 16);
+  EXPECT_EQ(mapper.sequence(), 0u);
+}
+
+TEST(MapperBadInput, LargeImagesFitAfterDecimation) {
+  Config config = undecimated();
+  config.decimation = 64;
+  Mapper mapper(config);
+  EXPECT_GT(mapper.integrate(plane_frame(plain_camera(20000, 512, 4000), 1).view()).created, 0u);
+}
+
+TEST(MapperBadInput, GridsLargerThanTheDevicesMemoryAreRefused) {
+  const Intrinsics full = {500, 500, 320, 240, 640, 480};
+  EXPECT_NO_THROW(check_grid_size(full, undecimated(), kMaxVoxels));
+  const std::string said = fault_of<BadFrame>([&] { check_grid_size(full, undecimated(), 1e8); });
+  EXPECT_TRUE(contains(said, "room for 0.1.")) << said;
+  EXPECT_TRUE(contains(said, "Set decimation to 2")) << said;
 }
 
 TEST(MapperBadInput, EveryFaultOfAConfigurationIsListed) {

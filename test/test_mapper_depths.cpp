@@ -129,6 +129,30 @@ TEST(MapperDepths, CarvedSpaceBesideAWall) {
   EXPECT_TRUE(std::any_of(surfels.begin(), surfels.end(), [](const Surfel& s) { return s.position.z() > 2.9F; }));
 }
 
+/// The exact test knows what the mapper carves: most of this room is beyond the range, and some of its pixels met nothing.
+TEST(MapperDepths, ACarvedRoomMeasuresUpToTheExactTest) {
+  Config config = undecimated();
+  config.z_max = 1.8;
+  config.carve_no_return = true;
+  config.carve_beyond_range = true;
+  Frames frames = orbit_frames(working_camera(), 6, 4);
+  std::size_t no_return = 0, beyond = 0, all = 0;
+  for (auto& frame : frames)
+    for (float& depth : cv::Mat_<float>(frame.depth)) {  // shares the image's pixels
+      if (depth > 2.4F) depth = kInfinity;
+      no_return += std::isinf(depth);
+      beyond += depth > config.z_max && !std::isinf(depth);
+      ++all;
+    }
+  ASSERT_GT(no_return, all / 20);
+  ASSERT_GT(beyond, all / 20);
+  const auto surfels = map_of(frames, config);
+  const auto s = score(surfels, frames, config);
+  SCOPED_TRACE(text(s, surfels.size()));
+  EXPECT_GE(s.right, 0.99);
+  EXPECT_LE(s.miss_2cm, 0.002);
+}
+
 TEST(MapperDepths, ASinglePixel) {
   const Intrinsics camera = coarse_camera();
   replay::RecordedFrame frame = plane_frame(camera, 0);

@@ -80,6 +80,53 @@ TEST(MapperFormats, DepthsOfAnyLayoutAreTheSame) {
   }
 }
 
+/// The same depths in steps of another length [m], which must be a whole part of a millimetre.
+Frames in_steps(Frames frames, double depth_unit) {
+  for (auto& frame : frames) frame.depth = cv::Mat(frame.depth * std::lround(0.001 / depth_unit));  // a copy; up to 65535
+  return frames;
+}
+
+TEST(MapperFormats, SixteenBitsInAnyUnit) {
+  const Frames millimetres = sensor_frames();
+  const auto expected = map_of(millimetres, undecimated());
+  const auto expected_score = score(expected, millimetres, undecimated());
+  for (const double depth_unit : {0.0002, 0.00025}) {
+    Config config = undecimated();
+    config.depth_unit = depth_unit;
+    const Frames steps = in_steps(millimetres, depth_unit);
+    EXPECT_TRUE(same(expected, map_of(steps, config))) << depth_unit;
+    EXPECT_TRUE(same(expected, map_of(in_metres(millimetres), config))) << "metres are metres";
+    EXPECT_EQ(score(expected, steps, config).right, expected_score.right) << depth_unit;
+    EXPECT_EQ(score(expected, steps, config).miss_2cm, expected_score.miss_2cm) << depth_unit;
+    EXPECT_FALSE(same(expected, map_of(steps, undecimated()))) << "the unit would have made a difference";
+  }
+}
+
+/// Sensors write 65535 where they have measured nothing. It is neither a depth within the range nor one beyond it, whose ray would be
+/// carved.
+TEST(MapperFormats, TheLargestNumberIsNoMeasurement) {
+  for (const double depth_unit : {0.001, 0.00005}) {  // 65535 is 65 m, 3.28 m
+    Frames largest = in_steps(sensor_frames(), depth_unit), none = largest;
+    for (auto& frame : largest) frame.depth.setTo(65535, frame.depth == 0);
+    for (std::size_t n = 0; n < none.size(); ++n) {
+      none[n].depth = largest[n].depth.clone();
+      none[n].depth.setTo(0, none[n].depth == 65535);
+    }
+    for (const bool carve : {false, true}) {
+      SCOPED_TRACE((carve ? "carved, " : "not carved, ") + std::to_string(depth_unit));
+      Config config = undecimated();
+      config.z_max = 3.5;
+      config.depth_unit = depth_unit;
+      config.carve_beyond_range = carve;
+      const auto expected = map_of(none, config);
+      EXPECT_TRUE(same(expected, map_of(largest, config)));
+      const auto s = score(expected, largest, config), expected_score = score(expected, none, config);
+      EXPECT_EQ(s.right, expected_score.right);
+      EXPECT_EQ(s.miss_2cm, expected_score.miss_2cm);
+    }
+  }
+}
+
 /// The map of frames whose colour images have `channels` bytes per pixel in the given order.
 std::vector<Surfel> map_of_colors(const Frames& frames, ColorImage::Order order, int channels, const Layout& layout) {
   Mapper mapper(undecimated());

@@ -1,4 +1,4 @@
-/// Frames that are too large for the device give a DeviceError, and smaller frames still work.
+/// Frames that are too large for the device are refused, and smaller frames still work.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -15,8 +15,11 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 
 /// Message of the error when a frame is integrated that is too large for the device; "" without an error.
 std::string refusal(Mapper& mapper, const DepthFrame& frame) {
-  return fault_of<DeviceError>([&] { mapper.integrate(frame); });
+  return fault_of<Error>([&] { mapper.integrate(frame); });
 }
+
+/// Whether the device is one that was made small above.
+bool is_small(const Mapper& mapper) { return contains(mapper.device(), "Portable Computing Language"); }
 
 void expect_goes_on(Mapper& mapper, const std::vector<Surfel>& before, const Frames& frames) {
   EXPECT_TRUE(same(before, mapper.surfels()));
@@ -25,7 +28,7 @@ void expect_goes_on(Mapper& mapper, const std::vector<Surfel>& before, const Fra
   EXPECT_GT(mapper.surfels().size(), before.size());
 }
 
-/// A grid of 1.6e9 voxels: one buffer is larger than the device allows.
+/// A grid of 1.5e9 voxels, for which the device has no memory: it is refused before any is asked for.
 TEST(MapperMemory, AGridTooLargeForTheDevice) {
   const Frames frames = orbit_frames(coarse_camera(), 12, 3);
   Mapper mapper(undecimated());
@@ -33,9 +36,9 @@ TEST(MapperMemory, AGridTooLargeForTheDevice) {
   const auto before = mapper.surfels();
   const auto large = plane_frame(plain_camera(1400, 1400, 250), 1);
   const std::string said = refusal(mapper, large.view());
-  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
-  EXPECT_TRUE(contains(said, "MiB")) << said;
-  EXPECT_TRUE(contains(said, "decimation")) << said;
+  if (said.empty() && !is_small(mapper)) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  EXPECT_TRUE(contains(said, "this device has room for")) << said;
+  EXPECT_TRUE(contains(said, "Set decimation to 2")) << said;
   expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
 }
 
@@ -49,7 +52,7 @@ TEST(MapperMemory, RecentViewsTooManyForTheDevice) {
   const auto before = mapper.surfels();
   const auto large = plane_frame(plain_camera(600, 600, 40), 1);
   const std::string said = refusal(mapper, large.view());
-  if (said.empty()) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
+  if (said.empty() && !is_small(mapper)) GTEST_SKIP() << "The device is too large for this test: " << mapper.device();
   EXPECT_TRUE(contains(said, "MiB")) << said;
   expect_goes_on(mapper, before, {frames.begin() + 3, frames.end()});
 }

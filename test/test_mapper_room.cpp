@@ -52,15 +52,21 @@ TEST(MapperRoom, MeasuresUpToTheExactTest) {
   const Walk& walk = Walk::instance();
   const auto s = score(walk.surfels, walk.frames, walk.config);
   SCOPED_TRACE(text(s, walk.surfels.size()));
-  EXPECT_GE(s.right, 0.975);
-  EXPECT_LE(s.buried, 0.002);
-  EXPECT_GE(s.within_2v, 0.993);
-  EXPECT_LE(s.fdr_5cm, 0.003);
-  EXPECT_LE(s.miss_2cm, 0.002);
-  EXPECT_LE(s.miss_5cm, 0.0005);
-  EXPECT_GE(s.label_ok, 0.975);
+  expect_errors(s, {0.00032, 0.00042, 0.00008, 0.00071, 0.00000, 0.01109});
   EXPECT_GT(s.boundary_points, 10000U);
   EXPECT_TRUE(all_sound(walk.surfels));
+}
+
+/// The paper's method alone is less accurate. What it reaches must not change unnoticed in either direction.
+TEST(MapperRoom, ThePapersConfigurationMeasuresUpToTheExactTest) {
+  const Walk& walk = Walk::instance();
+  Config config = load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/paper.yaml");
+  config.decimation = walk.config.decimation;
+  const std::vector<Surfel> surfels = map_of(walk.frames, config);
+  const auto s = score(surfels, walk.frames, config);
+  SCOPED_TRACE(text(s, surfels.size()));
+  EXPECT_TRUE(all_sound(surfels));
+  expect_errors(s, {0.02243, 0.00467, 0.00257, 0.16953, 0.07917, 0.03920}, 0.5);
 }
 
 TEST(MapperRoom, OccupiedSurfelsLieOnTheRoomsSurfaces) {
@@ -73,20 +79,20 @@ TEST(MapperRoom, OccupiedSurfelsLieOnTheRoomsSurfaces) {
     return share(occupied, 1,
                  [&](const Vector3d& p, const Vector3d&, double voxel) { return std::abs(walk.room.distance(p)) > voxels * voxel; });
   };
-  EXPECT_LE(off(1), 0.015);
-  EXPECT_LE(off(2), 0.002);
+  EXPECT_LE(off(1), 0.0108);
+  EXPECT_LE(off(2), 0.0024);
   EXPECT_LE(share(occupied, 1,
                   [&](const Vector3d& p, const Vector3d& normal, double voxel) {
                     return walk.room.distance(p + 2 * voxel * normal) < walk.room.distance(p);
                   }),
-            0.003)
+            0.0012)
       << "normals point into solids";
 }
 
 TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
   const Walk& walk = Walk::instance();
   EXPECT_LE(share(walk.surfels, 1, [&](const Vector3d& p, const Vector3d&, double voxel) { return walk.room.distance(p) < -2 * voxel; }),
-            0.0005);
+            1e-4);
 
   /// Number of seen points among seven: six at `distance` from a surfel along the axes, and one in front of it.
   const auto seen_around = [&](const Vector3d& p, const Vector3d& normal, double distance) {
@@ -96,12 +102,12 @@ TEST(MapperRoom, NoSurfelIsInsideASolidOrDeepInKnownOrUnknownSpace) {
     return count;
   };
   EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, voxel) == 7; }),
-            0.01)
+            0.0018)
       << "all space around a surfel is known";
   EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return seen_around(p, n, 2 * voxel) == 0; }),
-            0.012)
+            0.014)
       << "no space around a surfel is known";
-  EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return walk.seen(p - voxel * n); }), 0.04)
+  EXPECT_LE(share(walk.surfels, 20, [&](const Vector3d& p, const Vector3d& n, double voxel) { return walk.seen(p - voxel * n); }), 0.0185)
       << "the space behind a surfel is known";
 }
 
@@ -124,8 +130,8 @@ TEST(MapperRoom, EverySurfaceThatWasSeenHasItsSurfels) {
     bare += (nearest->position.cast<double>() - q).norm() > 1.5 * depth / camera.fx;
     not_occupied += nearest->label != Label::kOccupied;
   }
-  EXPECT_LE(bare, 10) << "of 500 points; pixels are far apart on slanting surfaces";
-  EXPECT_LE(not_occupied, 30);
+  EXPECT_LE(bare, 4) << "of 500 points; pixels are far apart on slanting surfaces";
+  EXPECT_LE(not_occupied, 45);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 
+#include "exact_test_input.hpp"
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 
 namespace frontier_surfels::scoring {
@@ -107,7 +108,7 @@ void expect_same_boundary(const OctomapTruth& truth, const std::map<Voxel, Surfe
 }
 
 TEST(OctomapTruth, BoundaryOfOneRay) {
-  OctomapTruth truth(kResolution, 0.05, 3, 1);
+  OctomapTruth truth(kResolution, reading(0.05, 3, 1));
   EXPECT_TRUE(truth.boundary().empty());
   SlowMap slow;
   look(truth, slow, {0, 0, 0}, 2, 4);
@@ -119,7 +120,7 @@ TEST(OctomapTruth, BoundaryOfOneRay) {
 }
 
 TEST(OctomapTruth, BoundaryOfRandomTree) {
-  OctomapTruth truth(kResolution, 0.05, 3, 1);
+  OctomapTruth truth(kResolution, reading(0.05, 3, 1));
   SlowMap slow;
   std::mt19937 random(5);
   const auto pick = [&](int low, int high) { return low + static_cast<int>(random() % (high - low + 1)); };
@@ -132,7 +133,7 @@ TEST(OctomapTruth, BoundaryOfRandomTree) {
 }
 
 TEST(OctomapTruth, BoundaryOfPrunedTree) {
-  OctomapTruth truth(kResolution, 0.05, 3, 1);
+  OctomapTruth truth(kResolution, reading(0.05, 3, 1));
   SlowMap slow;
   const double empty_mb = truth.memory_mb();
   // After so many views all free voxels have the lowest log odds, and OctoMap merges them into large leaves.
@@ -160,7 +161,7 @@ TEST(OctomapTruth, ReadsWhatTheMapperReads) {
   frame.depth = {5, 4, 5 * sizeof(float), DepthImage::Encoding::kMetresF32, depth.data(), false};
   frame.intrinsics = {20, 20, 0, 2, 5, 4};
   frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
-  OctomapTruth truth(kResolution, 0.5, 3, 2);
+  OctomapTruth truth(kResolution, reading(0.5, 3, 2));
   truth.add(frame);
   // Pixel (0, 1), the principal point: straight ahead, from z = 0.05 m to 0.9 m.
   SlowMap slow;
@@ -170,20 +171,62 @@ TEST(OctomapTruth, ReadsWhatTheMapperReads) {
 
   frame.T_world_camera = DepthFrame().T_world_camera;
   EXPECT_THROW(truth.add(frame), BadFrame);
-  EXPECT_THROW(OctomapTruth(0, 0.5, 3, 1), Error);
-  EXPECT_THROW(OctomapTruth(0.1, 3, 0.5, 1), Error);
-  EXPECT_THROW(OctomapTruth(0.1, 0.5, 3, 0), Error);
+  EXPECT_THROW(OctomapTruth(0, reading(0.5, 3, 1)), Error);
+  EXPECT_THROW(OctomapTruth(0.1, reading(3, 0.5, 1)), Error);
+  EXPECT_THROW(OctomapTruth(0.1, reading(0.5, 3, 0)), Error);
+}
+
+/// The ray of a carved pixel is free up to z_max, and the voxel in which it ends stays unknown. A measured surface beside it counts as
+/// ever.
+TEST(OctomapTruth, CarvesWhatTheConfigurationSays) {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  for (const float no_surface : {1.5F, kInf}) {
+    const std::vector<float> depth = {no_surface, 0.75F};
+    DepthFrame frame;
+    frame.depth = {2, 1, 2 * sizeof(float), DepthImage::Encoding::kMetresF32, depth.data(), false};
+    frame.intrinsics = {1000, 1000, 0, 0, 2, 1};
+    frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
+    Config config = reading(0.5, 1.1, 1);
+    config.carve_no_return = std::isinf(no_surface);
+    config.carve_beyond_range = !std::isinf(no_surface);
+    OctomapTruth truth(kResolution, config);
+    truth.add(frame);
+    SlowMap slow;
+    for (int z = 0; z < 11; ++z) z == 8 ? slow.hit({0, 0, z}) : slow.miss({0, 0, z});
+    expect_same_boundary(truth, slow.boundary(-3, 13));
+    for (const Surfel& surfel : truth.boundary())
+      EXPECT_TRUE(surfel.label == Label::kFrontier || voxel_of(surfel)[2] == 8) << "the end of a carved ray is no surface";
+  }
 }
 
 TEST(OctomapTruth, FrameWithoutMeasurementsAddsNothing) {
-  const std::uint16_t nothing = 0;
+  for (const std::uint16_t nothing : {0, 65535}) {
+    DepthFrame frame;
+    frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kStepsU16, &nothing, false};
+    frame.intrinsics = {10, 10, 0, 0, 1, 1};
+    frame.T_world_camera = Eigen::Isometry3d::Identity();
+    Config config = reading(0.5, 3, 1);
+    config.carve_beyond_range = true;
+    OctomapTruth truth(kResolution, config);
+    truth.add(frame);
+    EXPECT_TRUE(truth.boundary().empty()) << nothing;
+  }
+}
+
+TEST(OctomapTruth, SixteenBitsAreInTheConfiguredUnit) {
+  const std::uint16_t steps = 4250;  // 0.85 m
   DepthFrame frame;
-  frame.depth = {1, 1, sizeof(nothing), DepthImage::Encoding::kMillimetresU16, &nothing, false};
+  frame.depth = {1, 1, sizeof(steps), DepthImage::Encoding::kStepsU16, &steps, false};
   frame.intrinsics = {10, 10, 0, 0, 1, 1};
-  frame.T_world_camera = Eigen::Isometry3d::Identity();
-  OctomapTruth truth(kResolution, 0.5, 3, 1);
+  frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
+  Config config = reading(0.5, 3, 1);
+  config.depth_unit = 0.0002;
+  OctomapTruth truth(kResolution, config);
   truth.add(frame);
-  EXPECT_TRUE(truth.boundary().empty());
+  SlowMap slow;
+  for (int z = 0; z < 9; ++z) slow.miss({0, 0, z});
+  slow.hit({0, 0, 9});
+  expect_same_boundary(truth, slow.boundary(-3, 13));
 }
 
 std::vector<Surfel> at_x(const std::vector<double>& xs) {
@@ -193,7 +236,7 @@ std::vector<Surfel> at_x(const std::vector<double>& xs) {
 }
 
 TEST(OctomapTruth, ScoreCountsSurfelsFarFromTheOtherMap) {
-  const OctomapTruth truth(kResolution, 0.5, 3, 1);
+  const OctomapTruth truth(kResolution, reading(0.5, 3, 1));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const OctomapScore score = truth.score(at_x({0, 0.04, 0.06, 1.049, nan}), at_x({0, 1, 2, 3}));
   EXPECT_EQ(score.surfels, 4u);

@@ -3,19 +3,24 @@
 
 usage: test_replay_score.py REPLAY_SCORE MAKE_SYNTHETIC
 """
+import base64
 import csv
+import io
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
 import matplotlib.image
 import numpy
+from PIL import Image as Picture
 
 PROGRAM, MAKE_SYNTHETIC = None, None
 FRAMES = 16
@@ -69,7 +74,7 @@ class Usage(unittest.TestCase):
     def test_wrong_usage_prints_the_usage(self):
         there = [self.folder.name, '--report', self.report]
         wrong = ['another', '--no-such-option', '--first -1', '--first 5 --last 4', '--stride 0', '--threads many',
-                 '--octomap-resolution -1', '--octomap-resolution nan', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
+                 '--octomap-resolution -1', '--octomap-resolution nan', '--octomap-resolution automatic', '--sweep th_d=1', '--sweep no_such=0:1:3', '--set th_d']
         for arguments in [[], [self.folder.name], ['--report', self.report], *([*there, *text.split()] for text in wrong)]:
             with self.subTest(arguments=arguments):
                 self.check_refused(WRONG_USAGE, 'replay_score: .', arguments=arguments)
@@ -88,6 +93,28 @@ class Usage(unittest.TestCase):
                                     ('no-such.yaml', [self.folder.name, '--report', self.report, '--config', 'no-such.yaml'])]:
             with self.subTest(arguments=arguments):
                 self.check_refused(FAILED, sentence, arguments=arguments)
+
+    def test_names_that_are_too_long(self):
+        name = 300 * 'n'
+        for arguments in ([name, '--report', self.folder.name], [self.folder.name, '--report', self.folder.name, '--config', name]):
+            self.check_refused(1, name, arguments=arguments)
+        result = subprocess.run([MAKE_SYNTHETIC, name], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, '^[^\\n]*' + name + r'[^\n]*choose another folder\.\n$')
+
+    def test_a_tilde_that_no_shell_has_expanded_is_the_home_folder(self):
+        environment = {**os.environ, 'HOME': self.folder.name}
+        made = subprocess.run([MAKE_SYNTHETIC, "~/it's a room", '--frames', '2', '--size', '160x120'], capture_output=True, text=True,
+                              timeout=60, env=environment)
+        room = os.path.join(self.folder.name, "it's a room")
+        self.assertEqual((made.stdout, made.stderr), (f'2 frames are in {room}.\n', ''))
+        with open(os.path.join(self.folder.name, 'config.yaml'), 'w', encoding='utf-8') as file:
+            file.write('recent_views: 3\n')
+        result = run("~/it's a room", '--report=~/report', '--config=~/config.yaml', '--octomap-resolution', 0, '--no-exact', env=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        summary = read_json(os.path.join(self.folder.name, 'report'))
+        self.assertEqual((summary['input']['path'], summary['config']['recent_views']), (room, 3))
+        self.assertIn(os.path.join(self.folder.name, 'report', 'report.html'), result.stdout)
 
     def test_help_and_parameters_need_nothing_else(self):
         usage = run('--help')
@@ -148,7 +175,7 @@ class SyntheticRoom(unittest.TestCase):
         summary, rows = read_json(self.report), read_rows(self.report)
         self.assertEqual(len(rows), FRAMES)
         stages = list(summary['time_ms']['stages'])
-        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms'])
+        self.assertEqual(list(rows[0]), ['stamp', 'surfels', 'created', 'removed', *stages, 'total', 'octomap_ms', 'reason'])
         warm = [float(row['total']) for row in rows[5:]]
         self.assertAlmostEqual(summary['time_ms']['mean'], sum(warm) / len(warm), places=9)
         self.assertEqual(summary['time_ms']['median'], sorted(warm)[len(warm) // 2])
@@ -183,6 +210,28 @@ class SyntheticRoom(unittest.TestCase):
         self.assertEqual(kinds.count('data:image/png'), 4)  # map and OctoMap, from outside and inside
         self.assertEqual(kinds.count('data:image/svg+xml'), 3)  # time, size, sweep
         self.assertIn(f"{read_json(self.report)['surfels']['total']:,}".replace(',', '\u202f'), page)
+
+    def test_errors_have_a_colour_of_their_own(self):
+        with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+            pictures = re.findall(r'data:image/png;base64,([^"]+)', file.read())
+        share = []
+        for picture in pictures:
+            red, green, blue, _ = numpy.moveaxis(matplotlib.image.imread(io.BytesIO(base64.b64decode(picture))), 2, 0)
+            share.append(((red > green + 0.3) & (blue > green + 0.3)).mean())
+        wrong = 1 - read_json(self.report)['exact']['right']
+        self.assertGreater(wrong, 0.001)
+        self.assertGreater(share[0] + share[1], 0, 'the map has errors')
+        self.assertEqual(share[2:], [0, 0], "OctoMap's boundary is not judged")
+
+    def test_octomap_resolution_is_automatic_and_told(self):
+        report = os.path.join(self.folder.name, 'automatic')
+        result = run(self.room, '--report', report, '--set', 'decimation=8', '--no-exact', '--last', 2)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        octomap = read_json(report)['octomap']
+        with open(os.path.join(self.room, 'camera.txt'), encoding='utf-8') as file:
+            fx, fy = map(float, [line for line in file if not line.startswith('#')][0].split()[:2])
+        self.assertAlmostEqual(octomap['resolution'], 8 * 3 / min(fx, fy), places=9)
+        self.assertEqual(octomap['resolution'], octomap['pixel_spacing'])
 
     def test_what_is_switched_off_is_absent_and_old_files_are_removed(self):
         report = os.path.join(self.folder.name, 'reused')
@@ -242,7 +291,58 @@ class SyntheticRoom(unittest.TestCase):
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
 
 
-class Picture(unittest.TestCase):
+class MapFolder(unittest.TestCase):
+    """A recording of two walls, so far from each other that only the second one is in memory at the end."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.recording, self.report, self.kept = (os.path.join(self.folder.name, name) for name in ('walls', 'report', 'kept'))
+        os.makedirs(os.path.join(self.recording, 'depth'))
+        for frame in range(2):
+            Picture.fromarray(numpy.full((60, 80), 2750, dtype=numpy.uint16)).save(os.path.join(self.recording, 'depth', f'{frame:04}.png'))
+        for name, text in (('camera.txt', '70 70 39.5 29.5 80 60\n'), ('poses.txt', '0 0 0 0 0 0 0 1\n1 200 0 0 0 0 0 1\n')):
+            with open(os.path.join(self.recording, name), 'w', encoding='utf-8') as file:
+                file.write(text)
+
+    def replay(self, *more):
+        return run(self.recording, '--report', self.report, '--set', f'map_folder={self.kept}', '--set', 'eviction_radius=10',
+                   '--set', 'decimation=1', '--no-exact', *more)
+
+    def test_the_report_has_the_whole_map(self):
+        result = self.replay()
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        surfels = read_surfels(self.report)
+        self.assertGreater(min((surfels['x'] < 100).sum(), (surfels['x'] > 100).sum()), 1000)
+        self.assertEqual(read_json(self.report)['surfels']['total'], len(surfels))
+        with self.subTest('the map of another run is not scored as that of this recording'):
+            again = self.replay()
+            self.assertEqual(again.returncode, FAILED, again.stdout)
+            self.assertRegex(again.stderr, 'kept.*already has a map.*another')
+
+    def test_a_folder_that_is_deleted_meanwhile(self):
+        os.rename(os.path.join(self.recording, 'poses.txt'), os.path.join(self.recording, 'groundtruth.txt'))
+        with open(os.path.join(self.recording, 'groundtruth.txt'), 'a', encoding='utf-8') as file:
+            file.write('2 200 0 0 0 0 0 1\n')
+        with open(os.path.join(self.recording, 'depth.txt'), 'w', encoding='utf-8') as file:
+            file.write('0 depth/0000.png\n1 depth/0001.png\n2 fifo.png\n')
+        fifo = os.path.join(self.recording, 'fifo.png')  # replay_score waits here until somebody writes
+        os.mkfifo(fifo)
+
+        def delete():
+            with open(fifo, 'wb'):
+                shutil.rmtree(self.kept)
+
+        threading.Thread(target=delete, daemon=True).start()  # waits for ever if replay_score fails before
+        result = self.replay('--octomap-resolution', 0)
+        self.assertEqual(result.returncode, FAILED, result.stderr)
+        sentence = f'The map folder lacks a part of the map. The map folder {self.kept} has been deleted, moved or replaced'
+        self.assertIn(f'replay_score: {sentence}', result.stderr)
+        self.assertIn(sentence, ' '.join(read_json(self.report)['warnings']), 'the report is written all the same')
+        self.assertGreater(len(read_surfels(self.report)), 2000)
+
+
+class ReadmePicture(unittest.TestCase):
     """README's picture."""
 
     def blue_share(self, panel):

@@ -259,14 +259,14 @@ std::size_t check_creation(CameraSetup camera, int old_surfels, double density, 
   EXPECT_EQ(old_slots.size(), before);
 
   EXPECT_EQ(fixture.creation.count(), scene.voxels.size());
-  fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.settling, fixture.list, fixture.map());
+  fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.settling, fixture.list,
+                          fixture.map());
   EXPECT_EQ(fixture.map().size(), before + scene.voxels.size());
   const std::size_t count = scene.voxels.size();
   const std::vector<std::uint32_t> slots = fixture.access().find_slots(fixture.creation.new_surfels().surfels.read(count),
                                                                        fixture.creation.new_surfels().cells.read(count), old_slots);
-  fixture.map().finish_frame("test", 5);
   std::map<std::uint32_t, Surfel> by_slot;
-  for (const Surfel& surfel : fixture.map().last_changes().updated) by_slot[surfel.id] = surfel;
+  for (const Surfel& surfel : fixture.finish(5).updated) by_slot[surfel.id] = surfel;
   EXPECT_EQ(by_slot.size(), scene.voxels.size());
 
   std::size_t moved = 0;

@@ -53,8 +53,7 @@ Truth is_at_surface(const Scene& scene, const std::vector<float>& layer_depth, c
 std::size_t compare(const Scene& scene, VisitFixture& fixture, const std::vector<Surfel>& before, std::size_t removed, bool are_new) {
   std::map<std::uint32_t, Surfel> after, changed;
   for (const Surfel& surfel : fixture.map().download()) after[surfel.id] = surfel;
-  fixture.map().finish_frame("test", 4);
-  for (const Surfel& surfel : fixture.map().last_changes().updated) changed[surfel.id] = surfel;
+  for (const Surfel& surfel : fixture.finish(4).updated) changed[surfel.id] = surfel;
   EXPECT_EQ(after.size() + removed, before.size());
   const std::vector<float> layer_depth = fixture.layer_depth();
   Comparison occupied("occupied"), colored("colour taken"), told("change reported");

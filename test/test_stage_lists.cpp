@@ -60,6 +60,27 @@ TEST(StageLists, PrefixSum) {
   }
 }
 
+/// Sums of up to 2^32 - 2 are exact, and larger ones are refused: those of few values, of chunks, and of chunks of chunks.
+TEST(StageLists, LargestSums) {
+  TestLists lists;
+  std::uint32_t total = 0;
+  for (const std::size_t size : {std::size_t{2}, std::size_t{4096}, std::size_t{1} << 18, std::size_t{1} << 20}) {
+    SCOPED_TRACE(std::to_string(size) + " values");
+    const auto share = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / size);
+    std::vector<std::uint32_t> values(size, share);  // together 2^32
+    values.back() = share - 2;
+    const auto sums = lists.scan(values, &total);
+    EXPECT_EQ(total, Lists::kMaxTotal);
+    EXPECT_EQ(sums[size - 1], std::uint64_t{share} * (size - 1));
+    for (const std::uint32_t last : {share - 1, share, share + 1, 0xffffffffU}) {
+      values.back() = last;
+      EXPECT_THROW(lists.scan(values, &total), BadFrame) << "last value " << last;
+    }
+    values.front() = 0xffffffffU;
+    EXPECT_THROW(lists.scan(values, &total), BadFrame);
+  }
+}
+
 TEST(StageLists, SetBitsInOrder) {
   Random random(2);
   TestLists lists;

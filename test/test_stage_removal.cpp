@@ -173,8 +173,7 @@ TEST(StageRemoval, FreesSlots) {
     const std::vector<Surfel> left = fixture.map().download();
     ASSERT_EQ(left.size(), expected.size());
     for (const Surfel& surfel : left) EXPECT_TRUE(expected.count(surfel.id) && same(surfel, expected[surfel.id])) << surfel.id;
-    fixture.map().finish_frame("test", 9);
-    const Changes changes = fixture.map().last_changes();
+    const Changes changes = fixture.finish(9);
     EXPECT_TRUE(changes.updated.empty());
     EXPECT_TRUE(std::set<std::uint32_t>(changes.removed.begin(), changes.removed.end()) == removed_slots);
   }

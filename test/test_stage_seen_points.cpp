@@ -1,12 +1,12 @@
-/// Seen points and their kernels: what a view sets is compared with the exact test of every point of the lattice, and what a point is told with
-/// the sum over the eight points around it.
+/// Seen points and their kernels: what a view sets is compared with the exact test of every point of the lattice, and what a point is told
+/// with the sum over the eight points around it.
 
 #include <gtest/gtest.h>
 
+#include "stages/frame_fixture.hpp"
 #include "stages/reference_views.hpp"
 #include "stages/remembering.hpp"
 #include "stages/seen_bits.hpp"
-#include "stages/frame_fixture.hpp"
 #include "stages/view_settling.hpp"
 
 namespace frontier_surfels {

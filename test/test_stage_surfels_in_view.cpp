@@ -347,8 +347,7 @@ TEST(StageSurfelsInView, Split) {
     EXPECT_EQ(added, split.children - split.parents);
     EXPECT_EQ(scene.fixture.map().size(), before.size() + added);
     most_levels = std::max(most_levels, split.most_levels);
-    scene.fixture.map().finish_frame("test", 7);
-    const Changes told = scene.fixture.map().last_changes();
+    const Changes told = scene.fixture.finish(7);
     std::set<std::uint32_t> updated;
     for (const Surfel& surfel : told.updated) updated.insert(surfel.id);
     EXPECT_TRUE(updated == split.updated);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <sstream>
 
 #include "replay/progress.hpp"
@@ -25,7 +26,7 @@ std::vector<std::string> keys(const ordered_json& object) {
 using Keys = std::vector<std::string>;
 
 /// Frame i takes i + 1 ms. Stage "sweeps" takes a quarter of this, stage "median" a half, in odd frames only, and OctoMap 100 times as
-/// much.
+/// much. CPU times are twice, and 90 times as much.
 FrameRecord frame(int i) {
   FrameRecord record;
   record.report.stamp = 1305031102.160407 + i / 30.0;
@@ -36,6 +37,8 @@ FrameRecord frame(int i) {
   record.report.stages = {{"sweeps", (i + 1) / 4.0}};
   if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
   record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
+  record.cpu_ms = 2 * (i + 1);
+  record.depths.usable = 1;
   record.octomap = scoring::InsertionTime{100.0 * (i + 1), 90.0 * (i + 1)};
   return record;
 }
@@ -68,6 +71,32 @@ Scores some_scores() {
   exact.label_ok = 0.98;
   scores.exact = exact;
   return scores;
+}
+
+/// Yardsticks that have got a frame of a camera with fx = 500 and fy = 510.
+std::unique_ptr<Yardsticks> yardsticks_of_a_frame(const OctomapResolution& octomap_resolution) {
+  const std::vector<float> depth(8 * 8, 1.0F);
+  DepthFrame frame;
+  frame.depth = {8, 8, 8 * sizeof(float), DepthImage::Encoding::kMetresF32, depth.data(), false};
+  frame.intrinsics = {500, 510, 4, 4, 8, 8};
+  frame.T_world_camera = Eigen::Isometry3d::Identity();
+  auto yardsticks = std::make_unique<Yardsticks>(Config(), octomap_resolution, true);
+  yardsticks->add(frame);
+  return yardsticks;
+}
+
+/// Neighbouring pixels, of which every fourth is used, are 4 z / fx apart. The default z_max is 3 m.
+TEST(Yardsticks, OctomapsAutomaticResolutionIsThePixelSpacing) {
+  const auto automatic = yardsticks_of_a_frame(std::nullopt);
+  EXPECT_DOUBLE_EQ(automatic->octomap_resolution(), 4 * 3.0 / 500);
+  ASSERT_TRUE(automatic->octomap());
+  EXPECT_FLOAT_EQ(automatic->octomap_boundary().at(0).radius, std::sqrt(3.0) / 2 * 4 * 3.0 / 500);
+
+  const auto given = yardsticks_of_a_frame(0.01), none = yardsticks_of_a_frame(0);
+  EXPECT_EQ(given->octomap_resolution(), 0.01);
+  EXPECT_FLOAT_EQ(given->octomap_boundary().at(0).radius, std::sqrt(3.0) / 2 * 0.01);
+  EXPECT_DOUBLE_EQ(given->pixel_spacing(), 4 * 3.0 / 500);
+  EXPECT_FALSE(none->octomap());
 }
 
 TEST(TimeStatistics, OfFiveValues) {
@@ -112,24 +141,28 @@ TEST(StageNames, StagesThatStartLaterTakeTheirPlace) {
 }
 
 TEST(Summary, HasExactlyTheKeysOfTheInterface) {
-  const Yardsticks yardsticks(Config(), 0.02, true);
-  const ordered_json json = summary_json({"a/folder", {}}, 0.02, run_of(12), yardsticks, some_scores());
-  EXPECT_EQ(keys(json), (Keys{"input", "config", "device", "surfels", "time_ms", "memory_mb", "octomap", "exact"}));
+  const auto yardsticks = yardsticks_of_a_frame(0.02);
+  const ordered_json json = summary_json({"a/folder", {}}, run_of(12), *yardsticks, some_scores());
+  EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
+                              "surfels", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
   EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes"}));
   EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]), (Keys{"sweeps", "median"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]["sweeps"]), (Keys{"mean", "median"}));
   EXPECT_EQ(keys(json["memory_mb"]), (Keys{"peak_rss", "device"}));
-  EXPECT_EQ(keys(json["octomap"]), (Keys{"resolution", "time_ms", "memory_mb", "surfels", "fp", "fn", "fdr", "for"}));
+  EXPECT_EQ(keys(json["octomap"]),
+            (Keys{"resolution", "pixel_spacing", "time_ms", "cpu_ms", "memory_mb", "surfels", "fp", "fn", "fdr", "for"}));
   EXPECT_EQ(keys(json["octomap"]["time_ms"]), (Keys{"mean", "median"}));
+  EXPECT_EQ(keys(json["octomap"]["cpu_ms"]), (Keys{"mean", "median"}));
+  EXPECT_EQ(keys(json["cpu_ms"]), (Keys{"mean", "median"}));
   EXPECT_EQ(keys(json["exact"]), (Keys{"right", "buried", "floating", "flipped", "within_1v", "within_2v", "fdr_2cm", "fdr_5cm", "miss_1cm",
                                        "miss_2cm", "miss_5cm", "label_ok"}));
 }
 
 TEST(Summary, HasTheRunsValues) {
-  const Yardsticks yardsticks(Config(), 0.02, true);
-  const ordered_json json = summary_json({"a/folder", {}}, 0.02, run_of(12), yardsticks, some_scores());
+  const auto yardsticks = yardsticks_of_a_frame(0.02);
+  const ordered_json json = summary_json({"a/folder", {}}, run_of(12), *yardsticks, some_scores());
   EXPECT_EQ(json["input"]["path"], "a/folder");
   EXPECT_EQ(json["input"]["frames"], 12);
   EXPECT_EQ(json["input"]["skipped"], 2);
@@ -147,6 +180,10 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_DOUBLE_EQ(json["memory_mb"]["device"], 64.5);
   EXPECT_DOUBLE_EQ(json["octomap"]["time_ms"]["median"], 900);
   EXPECT_DOUBLE_EQ(json["octomap"]["for"], 0.005);
+  EXPECT_DOUBLE_EQ(json["octomap"]["resolution"], 0.02);
+  EXPECT_DOUBLE_EQ(json["octomap"]["pixel_spacing"], 4 * 3.0 / 500);
+  EXPECT_DOUBLE_EQ(json["cpu_ms"]["median"], 18);
+  EXPECT_DOUBLE_EQ(json["octomap"]["cpu_ms"]["median"], 810);
   EXPECT_EQ(json["octomap"]["fp"], 50);
   EXPECT_DOUBLE_EQ(json["exact"]["right"], 0.94);
   EXPECT_DOUBLE_EQ(json["exact"]["miss_2cm"], 0.0005);
@@ -154,10 +191,26 @@ TEST(Summary, HasTheRunsValues) {
 
 TEST(Summary, LeavesOutWhatWasNotMeasured) {
   const Yardsticks none(Config(), 0, false);
-  const ordered_json json = summary_json({"a", {}}, 0, run_of(3), none, {});
+  const ordered_json json = summary_json({"a", {}}, run_of(3), none, {});
   EXPECT_FALSE(json.contains("octomap"));
   EXPECT_FALSE(json.contains("exact"));
   EXPECT_NE(result_table(json).find("median 2.0 ms"), std::string::npos) << result_table(json);
+}
+
+TEST(Summary, TellsOfOctomapsGapsWhereThereAreSome) {
+  for (const bool gaps : {false, true}) {
+    const auto yardsticks = yardsticks_of_a_frame(gaps ? OctomapResolution(0.01) : std::nullopt);
+    const std::string table = result_table(summary_json({"a", {}}, run_of(3), *yardsticks, some_scores()));
+    EXPECT_EQ(table.find("OctoMap's own gaps") != std::string::npos, gaps) << table;
+    EXPECT_NE(table.find(gaps ? "voxels of 10.0 mm" : "voxels of 24.0 mm"), std::string::npos) << table;
+  }
+}
+
+/// A mapper in another process: its CPU time is not known.
+TEST(Summary, HasNoCpuTimeThatWasNotMeasured) {
+  auto run = run_of(3);
+  for (FrameRecord& record : run.frames) record.cpu_ms = 0;
+  EXPECT_FALSE(summary_json({"a", {}}, run, *yardsticks_of_a_frame(0.02), some_scores()).contains("cpu_ms"));
 }
 
 TEST(Summary, ConfigurationKeepsNamesAndKinds) {
@@ -180,12 +233,12 @@ TEST(FramesCsv, NumbersReadBackExactly) {
   std::istringstream csv(frames_csv(records));
   std::string line;
   ASSERT_TRUE(std::getline(csv, line));
-  EXPECT_EQ(line, "stamp,surfels,created,removed,sweeps,median,total,octomap_ms");
+  EXPECT_EQ(line, "stamp,surfels,created,removed,sweeps,median,total,octomap_ms,reason");
   for (const FrameRecord& record : records) {
     ASSERT_TRUE(std::getline(csv, line));
     std::vector<double> values;
     std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) values.push_back(std::stod(cell));
+    for (std::string cell; std::getline(cells, cell, ',') && !cell.empty();) values.push_back(std::stod(cell));
     const Report& report = record.report;
     const double median = report.stages.size() > 1 ? report.stages[1].ms : 0;
     const std::vector<double> expected = {report.stamp,
@@ -204,7 +257,7 @@ TEST(FramesCsv, NumbersReadBackExactly) {
 TEST(FramesCsv, HasNoOctomapColumnWithoutOctomap) {
   std::vector<FrameRecord> records = frames(1);
   records[0].octomap.reset();
-  EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total\n1305031102.160407,1000,1200,200,0.25,1.0\n");
+  EXPECT_EQ(frames_csv(records), "stamp,surfels,created,removed,sweeps,total,reason\n1305031102.160407,1000,1200,200,0.25,1.0,\n");
 }
 
 TEST(Trajectory, IsInTumsFormat) {
@@ -253,6 +306,12 @@ TEST(Sweep, RefusesWhatItCannotDo) {
   }
 }
 
+TEST(Sweep, RefusesToBeginWithAnotherValuesMap) {
+  Config base;
+  base.map_folder = "kept";
+  EXPECT_THROW(parse_sweep("th_d=0.1:0.2:2", base), Error);
+}
+
 TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   const Yardsticks yardsticks(Config(), 0, false);
   Config config;
@@ -263,6 +322,11 @@ TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   config = Config();
   config.decimation = 8;
   EXPECT_FALSE(yardsticks.fit(config));
+  for (bool Config::*carve : {&Config::carve_no_return, &Config::carve_beyond_range}) {
+    config = Config();
+    config.*carve = true;
+    EXPECT_FALSE(yardsticks.fit(config));
+  }
 }
 
 TEST(Progress, ShowsShareRateAndTimeLeft) {

@@ -9,7 +9,7 @@ not_needed=()
 for package in CLI11 OpenCV benchmark nlohmann_json octomap; do
   not_needed+=("-DCMAKE_DISABLE_FIND_PACKAGE_$package=TRUE")  # a find_package(... REQUIRED) of it stops CMake
 done
-cmake -S "$root" -B "$build" -DFRONTIER_SURFELS_ROS=OFF -DFRONTIER_SURFELS_TOOLS=OFF -DCMAKE_INSTALL_PREFIX="$build/prefix" \
+cmake -S "$root" -B "$build" -DFRONTIER_SURFELS_ROS=OFF -DFRONTIER_SURFELS_TOOLS=OFF -DCMAKE_INSTALL_PREFIX="$build/.prefix" \
   "${not_needed[@]}" "${@:2}"
 cmake --build "$build" --parallel "$(nproc)"
 

@@ -15,6 +15,7 @@ struct Config {
   int lanes = 0;
 
   // Working image and grid (paper 3.1)
+  double depth_unit = 0.001;
   int decimation = 4;
   double z_min = 0.5;
   double z_max = 3.0;
@@ -81,6 +82,9 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
         config.lanes);
 
   group = "Working image and grid";
+  field(FieldInfo{"depth_unit", "m", "one step of a 16-bit depth image; images of 32 bits and folders in TUM's layout are in metres anyway",
+                  1e-6, 1},
+        config.depth_unit);
   field(FieldInfo{"decimation", "pixel", "only every n-th column and row of the depth image is used", 1, 64}, config.decimation);
   field(FieldInfo{"z_min", "m", "smallest depth that is used; nearer measurements are ignored", 0.01, 100}, config.z_min);
   field(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);

@@ -29,18 +29,28 @@ class Mapper {
   /// @throws BadFrame     the frame is unusable; nothing has changed
   /// @throws FileError    the map folder cannot be read, or an earlier write to it has failed. The frame is refused, the map loses nothing,
   ///                      and later frames may succeed. Blocks may have entered or left memory all the same; changes() reports these
-  /// @throws DeviceError  the device failed or is out of memory
+  /// @throws DeviceError  the device failed or is out of memory. The map is as it was before the frame. If the device fails again while the
+  ///                      frame is undone, the next call undoes it first, and throws as long as it cannot
   Report integrate(const DepthFrame& frame);
 
-  /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame.
+  /// All surfels, ordered by id. With a map_folder: the surfels in memory, near the camera; none before the first frame. The whole map is
+  /// whole_map().
   std::vector<Surfel> surfels() const;
 
-  /// The surfels whose centre lies in a box of the world frame [m].
+  /// The surfels of surfels() whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
+
+  /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
+  std::vector<Surfel> whole_map() const;
 
   /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact. Those of earlier
   /// frames may also contain unchanged surfels near changed ones, and ids that were free before. Surfels that move to the map folder are
   /// reported as removed, and as updated with new ids when they come back.
+  ///
+  /// Any number of readers may follow the map: each begins with since = 0, and then gives the sequence number of its last Changes. Until a
+  /// reader has been told that a surfel is gone, its id is not given again, be it by frames, reset or load. A reader that has not asked for
+  /// 1000 frames is forgotten, and so is one that begins with another number: of those pages of the map that have changed, it gets all ids
+  /// as removed, and then all surfels.
   Changes changes(std::uint64_t since) const;
 
   /// The whole map as files keep it, with what has been seen; with a map_folder, also what is on disk. @throws FileError
@@ -50,22 +60,33 @@ class Mapper {
   /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
-  /// Replaces the map by a saved one; with a map_folder, also the map in the folder. Mapping then goes on as with the map that was saved. From a
-  /// file without what has been seen, as PCD files are, that is filled in from the surfels.
+  /// With a map_folder, waits until the whole map is written to it; without one, does nothing. To be called before the mapper is destroyed:
+  /// the destructor writes the map as well, but can tell nobody that it failed.
+  /// @throws FileError  the folder cannot be written, or has been deleted. The map loses nothing, and flush() may be called again
+  void flush();
+
+  /// Why the map folder could not be written at the last try; empty if all is well. Later frames and flush() try again. From any thread.
+  std::string map_folder_fault() const;
+
+  /// Replaces the map by a saved one; with a map_folder, also the map in the folder. Mapping then goes on as with the map that was saved.
+  /// From a file without what has been seen, as PCD files are, that is filled in from the surfels.
   /// @throws FileError  the file cannot be used; the map stays as it was
   void load(const std::string& path);
 
   /// Replaces the map by these surfels, which get new ids. Radii are limited to four blocks (2 m where z_max is at most 12 m), which is far
   /// more than this mapper makes.
+  /// @throws DeviceError  the device failed or is out of memory. The map is as it was; or it is lost, and all calls say so until load() or
+  ///                      reset() succeeds
   void load(const std::vector<Surfel>& surfels);
 
-  /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in from
-  /// the surfels. @throws FileError  what has been seen is damaged; the map stays as it was
+  /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in
+  /// from the surfels. @throws FileError  what has been seen is damaged; the map stays as it was
   void load(const SavedMap& map);
 
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
   void reset();
 
+  /// Counts the surfels of surfels().
   Statistics statistics() const;
   std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
   std::uint64_t sequence() const;

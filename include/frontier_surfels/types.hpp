@@ -45,13 +45,13 @@ struct Intrinsics {
 /// A view of a depth image, depth[height][step / pixel size]: distance along the optical axis. Does not own the data.
 struct DepthImage {
   enum class Encoding {
-    kMillimetresU16,  ///< 16UC1, mono16: 0 = no measurement
-    kMetresF32,       ///< 32FC1: 0, NaN = no measurement, +Inf = no surface within the sensor's range (REP 118)
+    kStepsU16,   ///< 16UC1, mono16, in steps of Config::depth_unit, by default [mm]: 0, 65535 = no measurement
+    kMetresF32,  ///< 32FC1: 0, NaN = no measurement, +Inf = no surface within the sensor's range (REP 118)
   };
   int width = 0;
   int height = 0;
   std::size_t step = 0;  ///< [byte] from one row to the next
-  Encoding encoding = Encoding::kMillimetresU16;
+  Encoding encoding = Encoding::kStepsU16;
   const void* data = nullptr;
   bool swap_bytes = false;  ///< the data's endianness is not this machine's
 };
@@ -88,7 +88,7 @@ struct Surfel {
   float radius = 0;                                    ///< [m]
   Label label = Label::kFrontier;
   std::array<std::uint8_t, 3> rgb = {0, 0, 0};  ///< (0, 0, 0) when no colour was seen
-  std::uint32_t id = 0;                         ///< never changes; reused only after the surfel's removal was reported
+  std::uint32_t id = 0;                         ///< never changes; given to another surfel only after this one's removal was reported
 };
 
 /// Points that decide whether a surfel is right, as distances from its centre in radii: space should be unknown kBackProbe behind it,
@@ -97,15 +97,19 @@ struct Surfel {
 constexpr double kBackProbe = 0.25;
 constexpr double kFrontProbe = 1.75;
 
-/// Difference between the map at an earlier sequence number and the map now.
+/// Radius of a new surfel, half the diagonal of its voxel [voxel]: sqrt(3) / 2.
+constexpr double kNewRadius = 0.86602540378443865;
+
+/// Difference between the map at an earlier sequence number and the map now: first remove, then update.
 struct Changes {
   std::uint64_t sequence = 0;          ///< of the map now
   std::vector<Surfel> updated;         ///< new or changed surfels
-  std::vector<std::uint32_t> removed;  ///< ids that are no longer in the map
+  std::vector<std::uint32_t> removed;  ///< ids whose surfels are gone. An id that is updated as well belongs to another surfel now, which
+                                       ///< happens only to readers whom Mapper::changes() does not know
 };
 
-/// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size [m],
-/// block (x, y, z) with its lowest corner at (x, y, z) block_size; points are counted along a block's edge.
+/// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size
+/// [m], block (x, y, z) with its lowest corner at (x, y, z) block_size; points are counted along a block's edge.
 struct SeenSpace {
   struct Block {
     std::array<std::int32_t, 3> block = {0, 0, 0};  ///< x, y, z
@@ -118,10 +122,10 @@ struct SeenSpace {
 
 /// A kept view, as it is saved with a map.
 struct SavedView {
-  Intrinsics intrinsics;                                            ///< of the working image
+  Intrinsics intrinsics;                                             ///< of the working image
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();  ///< pose of the optical frame
-  double depth_step = 0;                                            ///< [m]
-  std::vector<std::uint16_t> depth;                                 ///< [height][width], in steps; 0: no measurement
+  double depth_step = 0;                                             ///< [m]
+  std::vector<std::uint16_t> depth;                                  ///< [height][width], in steps; 0: no measurement
 };
 
 /// A whole map, as files keep it.

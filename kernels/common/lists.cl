@@ -1,4 +1,5 @@
 // Lists from bit fields and counts, in an order that does not depend on the number of threads: counts, their prefix sum, then the entries.
+// A total that does not fit is UINT_MAX, so that the host can refuse it. add_sat would make every sum wait longer for the one before it.
 
 // One work item handles a chunk of WORD_CHUNK words: it counts their set bits.
 //   in  words[count];   out counts[chunks]
@@ -28,13 +29,17 @@ __kernel void sum_chunks(__global const uint* values, const uint count, __global
   const uint chunk = get_global_id(0);
   const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
   if (begin >= count) return;
-  uint sum = 0;
-  for (uint n = begin; n < end; ++n) sum += values[n];
-  chunk_sums[chunk] = sum;
+  uint sum = 0, too_large = 0;
+  for (uint n = begin; n < end; ++n) {
+    const uint value = values[n];
+    sum += value;
+    too_large |= sum < value;
+  }
+  chunk_sums[chunk] = too_large ? UINT_MAX : sum;
 }
 
 // One work item handles a chunk of SCAN_CHUNK values: they become the sums of all values before them.
-//   in  chunk_offsets[chunks]: sums of all chunks before;   i/o values[count + 1]: the last becomes the total
+//   in  chunk_offsets[chunks + 1]: sums of all chunks before, and the total;   i/o values[count + 1]: the last becomes the total
 __kernel void scan_chunks(__global uint* values, const uint count, __global const uint* chunk_offsets) {
   const uint chunk = get_global_id(0);
   const uint begin = chunk * SCAN_CHUNK, end = min(begin + SCAN_CHUNK, count);
@@ -45,20 +50,21 @@ __kernel void scan_chunks(__global uint* values, const uint count, __global cons
     values[n] = sum;
     sum += value;
   }
-  if (end == count) values[count] = sum;
+  if (end == count) values[count] = chunk_offsets[chunk + 1];
 }
 
 // One work item does all: the prefix sum of few values.
 //   i/o values[count + 1]: the last becomes the total
 __kernel void scan_few(__global uint* values, const uint count) {
   if (get_global_id(0) > 0) return;
-  uint sum = 0;
+  uint sum = 0, too_large = 0;
   for (uint n = 0; n < count; ++n) {
     const uint value = values[n];
     values[n] = sum;
     sum += value;
+    too_large |= sum < value;
   }
-  values[count] = sum;
+  values[count] = too_large ? UINT_MAX : sum;
 }
 
 // One work item handles a chunk of WORD_CHUNK words: it lists their set bits.

@@ -87,9 +87,9 @@ INLINE int seen_in_box(const Frame* f, const SeenPoints* seen, const Box* box) {
   const float scale = (float)(SEEN_BRICK << f->seen_shift) / f->window.block_size;
   const float3 center = (float3)(T->r00 * c.x + T->r01 * c.y + T->r02 * c.z + T->t0, T->r10 * c.x + T->r11 * c.y + T->r12 * c.z + T->t1,
                                  T->r20 * c.x + T->r21 * c.y + T->r22 * c.z + T->t2);
-  const float3 half_size = (float3)(fabs(T->r00) * h.x + fabs(T->r01) * h.y + fabs(T->r02) * h.z,
-                                    fabs(T->r10) * h.x + fabs(T->r11) * h.y + fabs(T->r12) * h.z,
-                                    fabs(T->r20) * h.x + fabs(T->r21) * h.y + fabs(T->r22) * h.z);
+  const float3 half_size =
+      (float3)(fabs(T->r00) * h.x + fabs(T->r01) * h.y + fabs(T->r02) * h.z, fabs(T->r10) * h.x + fabs(T->r11) * h.y + fabs(T->r12) * h.z,
+               fabs(T->r20) * h.x + fabs(T->r21) * h.y + fabs(T->r22) * h.z);
   const float3 low = (center - half_size) * scale - 1.0f, high = (center + half_size) * scale + 1.0f;  // half a point more than needed
   const int points_shift = SEEN_BRICK_SHIFT + f->seen_shift, sides = (1 << f->seen_shift) - 1;
   const int3 size = (int3)(f->window.size_x, f->window.size_y, f->window.size_z) << points_shift;

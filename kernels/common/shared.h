@@ -38,10 +38,10 @@ namespace frontier_surfels {
 // Words whose set bits one work item lists.
 #define WORD_CHUNK 16
 
-// Surfels of a page of the map: a bit each in the words that say something of a page.
+// Number of surfels in a page of the map. Words about a page have one bit for each of them.
 #define PAGE_SLOTS 64
 
-// Work items of the groups that go through the window's pages: they have several pages, or one.
+// Number of work items in the groups that go through the pages in view. A group has one or several pages.
 #define PAGE_GROUP 64
 
 // Work items that sort new surfels by block, each its share.
@@ -55,8 +55,9 @@ namespace frontier_surfels {
 // Side of the blocks of a view's image whose largest depth is known [pixel].
 #define VIEW_BLOCK 8
 
-// Images of views are kept in patches of PATCH_COLUMNS x PATCH_ROWS pixels, row by row, and so are the pixels of a patch: one is 64 bytes.
-// Points near each other are asked for together, and a row of pixels would be of use for one of them.
+// Images of views are kept in patches of PATCH_COLUMNS x PATCH_ROWS pixels, which are 64 bytes. Patches lie row by row, and so do the
+// pixels of a patch. Neighbouring points are looked up together, and their pixels are likelier to be in one patch than in one row of the
+// image.
 #define PATCH_COLUMNS 8
 #define PATCH_ROWS 4
 
@@ -113,11 +114,11 @@ namespace frontier_surfels {
 // Surfels in view are those whose ellipsoid comes so near to the grid; generous, as more of them change nothing [voxel]. - Paper 3.4
 #define REACH_MARGIN 1.5f
 
-// How often a surfel is split in four within a frame at most. - Paper 3.4
+// Maximum number of times that a surfel is split in four within a frame. - Paper 3.4
 #define SPLIT_LEVELS 6
 
-// Paths that section 3.2 of the paper must walk are at most so far from a candidate, along each axis: the median looks one voxel around,
-// and the hull at the cells beside a path's [voxel].
+// Section 3.2 of the paper must walk paths up to this distance from a candidate, along each axis: the median looks one voxel around, and
+// the hull looks at the cells beside a path [voxel].
 #define LINE_MARGIN 2
 
 // New surfels slide along their normals by at most SLIDE_STEPS steps of SLIDE_STEP, a step being left in hand; a candidate is therefore
@@ -140,7 +141,8 @@ namespace frontier_surfels {
 #define COUNT_IN_VIEW 0
 #define COUNT_LARGE 1
 #define COUNT_REMOVED 2
-#define COUNTS 3
+#define COUNT_LABELLED 3
+#define COUNTS 4
 
 // Bit fields of the sign field's events: EVENT_PLANES for each family of paths (i, j, k), in this order.
 #define EVENT_ENTER_FORWARD 0

@@ -14,7 +14,8 @@ __kernel void scatter_bricks(__global const int* numbers, const int count, __glo
 }
 
 // One work item handles a word of a brick of which the points in a box are forgotten.
-//   in  ranges[count]: first point along x, y, z, the number of the brick, one past the last point, and whether all its points were seen before
+//   in  ranges[count]: first point along x, y, z, the number of the brick, one past the last point, and whether all its points were seen
+//   before
 __kernel void forget_points(__global const int8* ranges, const int count, __global ulong* bricks) {
   const int n = get_global_id(0) / SEEN_WORDS, word = get_global_id(0) % SEEN_WORDS;
   if (n >= count) return;
@@ -23,7 +24,8 @@ __kernel void forget_points(__global const int8* ranges, const int count, __glob
   ulong forgotten = 0;
   for (int bit = 0; bit < 64; ++bit) {
     const int3 p = corner + (int3)(bit & 3, bit >> 2 & 3, bit >> 4);
-    if (p.x >= range.s0 && p.y >= range.s1 && p.z >= range.s2 && p.x < range.s4 && p.y < range.s5 && p.z < range.s6) forgotten |= 1ul << bit;
+    if (p.x >= range.s0 && p.y >= range.s1 && p.z >= range.s2 && p.x < range.s4 && p.y < range.s5 && p.z < range.s6)
+      forgotten |= 1ul << bit;
   }
   __global ulong* own = bricks + SEEN_WORDS * range.s3 + word;
   *own = (range.s7 != 0 ? ~0ul : *own) & ~forgotten;

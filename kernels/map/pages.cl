@@ -2,6 +2,8 @@
 //
 // New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: this does not
 // depend on the number of threads. For that they are sorted by cell (block of the window), and keep the list's order in each cell.
+//
+// taken[pages] has a bit for each slot that is not free. It is `alive`, or, while ids must not be given again at once, `reserved`.
 
 // One work item handles an entry of a list of bits in pages: it becomes a slot of the map.
 //   in  pages;   i/o list[count]: before: 64 n + bit for page pages[n]; after: slots
@@ -31,10 +33,10 @@ __kernel void sort_by_cell(__global const uint* new_cells, const uint count, __g
 }
 
 // One work item handles a page: it counts its free slots.
-//   in  pages[count]: of the window, by cell;   out free_slots[count]
-__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global uint* free_slots) {
+//   in  pages[count]: of the window, by cell;  taken;   out free_slots[count]
+__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* taken, __global uint* free_slots) {
   const uint n = get_global_id(0);
-  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(alive[pages[n]]);
+  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(taken[pages[n]]);
 }
 
 // Pages that a block needs for new surfels in addition to its free slots.
@@ -57,7 +59,7 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
 
 // One work item does all of the above for few new surfels, where launches take longer than that.
 __kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
-                       __global const ulong* alive, __global const uint* cell_pages, const uint cells, __global uint* free_before,
+                       __global const ulong* taken, __global const uint* cell_pages, const uint cells, __global uint* free_before,
                        __global uint* cell_begin, __global uint* missing, __global uint* order) {
   if (get_global_id(0) > 0) return;
   for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
@@ -71,7 +73,7 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
   uint free_slots = 0;
   for (uint n = 0; n < page_count; ++n) {
     free_before[n] = free_slots;
-    free_slots += PAGE_SLOTS - (uint)popcount(alive[pages[n]]);
+    free_slots += PAGE_SLOTS - (uint)popcount(taken[pages[n]]);
   }
   free_before[page_count] = free_slots;
   for (uint cell = 0; cell < cells; ++cell)
@@ -82,38 +84,103 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
 // One work item handles a page of the window: its free slots take their share of the cell's new surfels.
 //   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
 //       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
-//   i/o page_block, alive, changed, surfels: the map
+//   i/o page_block, alive, changed, surfels: the map;  taken: may be the same buffer as `alive`
 __kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
                          __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
-                         __global uint4* surfels) {
+                         __global ulong* taken, __global uint4* surfels) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1], known = count - new_count;
   const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
   uint at = cell_begin[cell] + before - free_before[cell_pages[cell]];
-  ulong taken = 0;
-  for (ulong left = ~alive[page]; left != 0 && at < end; left &= left - 1, ++at) {
+  const ulong before_this = n < known ? taken[page] : 0;  // added pages are free, whatever they have been before
+  ulong filled = 0;
+  for (ulong left = ~before_this; left != 0 && at < end; left &= left - 1, ++at) {
     const uint bit = (uint)lowest_bit(left);
     surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
-    taken |= 1ul << bit;
+    filled |= 1ul << bit;
   }
-  if (taken == 0) return;
+  if (filled == 0) return;
   const int3 place = (int3)(cell % window.size_x, cell / window.size_x % window.size_y, cell / window.size_x / window.size_y);
   page_block[page].xyz = (int3)(window.origin_x, window.origin_y, window.origin_z) + place;
-  alive[page] |= taken;
-  changed[page] |= taken;
+  alive[page] |= filled;
+  changed[page] |= filled;
+  taken[page] = before_this | filled;
+}
+
+// One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved.
+//   in  page_block, alive;   i/o reserved[count]
+__kernel void reserve_slots(const uint count, __global const int4* page_block, __global const ulong* alive, const uint told,
+                            __global ulong* reserved) {
+  const uint page = get_global_id(0);
+  if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page];
+}
+
+// One work item handles a page of the window: it keeps what the frame may overwrite next. Called again before more is overwritten.
+//   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
+//       page_block, alive, taken, changed, surfels: the map; surfels marked as changed may be overwritten, too
+//       room: number of surfels that can be kept
+//   out kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count]: as at the first call
+//   i/o kept_slots[count]: a bit for each surfel that is kept;  kept_count: number of these
+//       kept_surfel_slots[kept_count], kept_surfels[kept_count]: where each of them was, in any order
+__kernel void back_up_pages(__global const uint* pages, const uint count, const int first, __global const ulong* freed,
+                            __global const int4* page_block, __global const ulong* alive, __global const ulong* taken,
+                            __global const ulong* changed, __global const uint4* surfels, const uint room, __global uint* kept_pages,
+                            __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_taken, __global ulong* kept_slots,
+                            __global uint* kept_count, __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = pages[n];
+  if (first) {
+    kept_pages[n] = page;
+    kept_frames[n] = page_block[page].w;
+    kept_alive[n] = alive[page];
+    kept_taken[n] = taken[page];
+    kept_slots[n] = 0;
+  }
+  const ulong slots = kept_alive[n] & ~kept_slots[n] & (freed[n] | changed[page]);
+  if (slots == 0) return;
+  kept_slots[n] |= slots;
+  uint at = atomic_add(kept_count, (uint)popcount(slots));
+  for (ulong left = slots; left != 0 && at < room; left &= left - 1, ++at) {
+    kept_surfel_slots[at] = PAGE_SLOTS * page + (uint)lowest_bit(left);
+    kept_surfels[at] = surfels[kept_surfel_slots[at]];
+  }
+}
+
+// One work item handles a page that back_up_pages has kept, after the frame has failed.
+//   in  kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count];   out page_block, alive, taken: the map as it was
+__kernel void restore_pages(__global const uint* kept_pages, const uint count, __global const int* kept_frames,
+                            __global const ulong* kept_alive, __global const ulong* kept_taken, __global int4* page_block,
+                            __global ulong* alive, __global ulong* taken) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  const uint page = kept_pages[n];
+  page_block[page].w = kept_frames[n];
+  alive[page] = kept_alive[n];
+  taken[page] = kept_taken[n];
+}
+
+// One work item handles a surfel that back_up_pages has kept.
+//   in  kept_surfel_slots[count], kept_surfels[count];   out surfels: the map as it was
+__kernel void restore_surfels(const uint count, __global const uint* kept_surfel_slots, __global const uint4* kept_surfels,
+                              __global uint4* surfels) {
+  const uint n = get_global_id(0);
+  if (n < count) surfels[kept_surfel_slots[n]] = kept_surfels[n];
 }
 
 // One work item handles a page of the window at the end of a frame.
 //   in  pages[count], alive;   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
-//   out changes[count]: this frame's;  empty[count]: 1 if nothing is left in the page
+//   out changed_pages[count], changes[count]: the pages, and what this frame has changed in them;  empty[count]: 1 if nothing is left
 __kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
-                           const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
+                           const uint frame, __global int4* page_block, __global uint* changed_pages, __global ulong* changes,
+                           __global uchar* empty) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
+  changed_pages[n] = page;
   changes[n] = changed[page];
   empty[n] = alive[page] == 0 ? 1 : 0;
   if (changed[page] != 0) page_block[page].w = (int)frame;

@@ -33,8 +33,8 @@ INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* vi
 
 // Positions of new surfels in their voxels: they slide along their normals until they are near the boundary, by whole steps. A step is left
 // in hand before what this view or a kept one knows, and a surfel that has known space at front_probe before it does not lose it.
-INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, bool ask_seen, __global const ushort* depths,
-                                Voxels v, Points center, Points normal, intv asked) {
+INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, bool ask_seen,
+                                __global const ushort* depths, Voxels v, Points center, Points normal, intv asked) {
   const Grid* g = &f->grid;
   const Limits* limits = &f->limits;
   const View* view = &f->own_view;
@@ -68,9 +68,9 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
 //   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
 __kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
                              __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                             __global const int* tables, __global const int* bricks, __global const uchar* tile_seen, __global const int* created, const int count,
-                             __global const int* voxels, __global const int* around, __global const float* directions,
-                             __global uint4* new_surfels, __global int* new_cells) {
+                             __global const int* tables, __global const int* bricks, __global const uchar* tile_seen,
+                             __global const int* created, const int count, __global const int* voxels, __global const int* around,
+                             __global const float* directions, __global uint4* new_surfels, __global int* new_cells) {
   const int chunk = get_global_id(0);
   if (chunk * LANES >= count) return;
   intv exist, ragged = 0;

@@ -1,5 +1,5 @@
-// Remembering: what a view has seen that will no longer be kept becomes seen points (common/seen_points.cl) - ours. The points of the lattice
-// that the view knows are set, exactly those: the shortcuts for whole bricks decide only how long it takes.
+// Remembering: what a view has seen that will no longer be kept becomes seen points (common/seen_points.cl) - ours. The points of the
+// lattice that the view knows are set, exactly those: the shortcuts for whole bricks decide only how long it takes.
 
 // Does a view know every point in a rectangle of its image up to the depth `far`?
 //   pixels: first column and row, last column and row
@@ -24,7 +24,8 @@ INLINE float least(float8 v) {
 //   center, half_size: of the cube, in the frame of view->to_image [m]
 INLINE int cube_in_view(const View* view, __global const ushort* depths, float3 center, float half_size) {
   const Transform* T = &view->to_image;
-  const float8 x = (float8)(-1, 1, -1, 1, -1, 1, -1, 1) * half_size + center.x, y = (float8)(-1, -1, 1, 1, -1, -1, 1, 1) * half_size + center.y,
+  const float8 x = (float8)(-1, 1, -1, 1, -1, 1, -1, 1) * half_size + center.x,
+               y = (float8)(-1, -1, 1, 1, -1, -1, 1, 1) * half_size + center.y,
                z = (float8)(-1, -1, -1, -1, 1, 1, 1, 1) * half_size + center.z;
   const float8 depth = T->r20 * x + T->r21 * y + T->r22 * z + T->t2;
   const float slack = 1e-5f * (fabs(T->t2) + fabs(center.x) + fabs(center.y) + fabs(center.z)) + 1e-5f;  // of float
@@ -74,10 +75,10 @@ __kernel void set_seen_bricks(__global const int2* entries, const int count, __g
   if (entry.y > SEEN_BRICK_FULL) bricks[SEEN_WORDS * entry.y + word] = 0;
 }
 
-// Words along an edge of the cubes that one work item of see_points handles, and such cubes in a brick: a cube that the view knows nothing of
-// is done with at once.
+// Words along an edge of the cubes that one work item of see_points handles, and such cubes in a brick: a cube that the view knows nothing
+// of is done with at once.
 #define SEE_EDGE (LANES == 1 ? 1 : 2)
-#define SEE_WORD(w) ((((w) >> 2) * 4 + ((w) >> 1 & 1)) * 4 + ((w) & 1))  // of word w of a cube, from its first one
+#define SEE_WORD(w) ((((w) >> 2) * 4 + ((w) >> 1 & 1)) * 4 + ((w)&1))  // of word w of a cube, from its first one
 #define SEE_CUBES (SEEN_WORDS / (SEE_EDGE * SEE_EDGE * SEE_EDGE))
 
 // One work item handles a cube of words of a brick.
@@ -104,7 +105,8 @@ __kernel void see_points(const Window window, const View view, const int shift, 
     ulong seen = before;
     for (int bit = 0; bit < 64; bit += LANES) {
       const intv point = bit + lane_numbers(), open = ~lane_marks((uint)(before >> bit));
-      const Points p = {(convert_floatv(of_word.x + (point & 3)) + 0.5f) * spacing, (convert_floatv(of_word.y + (point >> 2 & 3)) + 0.5f) * spacing,
+      const Points p = {(convert_floatv(of_word.x + (point & 3)) + 0.5f) * spacing,
+                        (convert_floatv(of_word.y + (point >> 2 & 3)) + 0.5f) * spacing,
                         (convert_floatv(of_word.z + (point >> 4)) + 0.5f) * spacing};
       seen |= (ulong)lane_bits(knows(&view, depths, p, open)) << bit;
     }

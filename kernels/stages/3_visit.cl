@@ -54,7 +54,7 @@ typedef struct {
 //       alive, page_block, surfels: the map;  observed: bit field C~, as 32-bit halves
 //   i/o candidates: bit field by tiles, as 32-bit halves: voxels of surfels that stay are taken off
 //       changed: bits of surfels that stay and that 16_labels will label are set
-//       counts[COUNTS]: COUNT_IN_VIEW, COUNT_LARGE and COUNT_REMOVED are added to
+//       counts[COUNTS]: COUNT_IN_VIEW, COUNT_LARGE, COUNT_REMOVED and COUNT_LABELLED are added to
 //   out in_view[count], large[count], removed[count]: a bit for each surfel of each page
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
     const Frame f, __global const ushort* depths, __global const float* depth, __global const int* column_end, __global const uint* pages,
@@ -101,12 +101,13 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item > 0 || n >= count) return;
   const ulong in_view_here = read_shared_word(&of_page->in_view), large_here = read_shared_word(&of_page->large),
-              removed_here = read_shared_word(&of_page->removed);
+              removed_here = read_shared_word(&of_page->removed), labelled_here = read_shared_word(&of_page->labelled);
   in_view[n] = in_view_here;
   large[n] = large_here;
   removed[n] = removed_here;
-  changed[page] |= read_shared_word(&of_page->labelled);
+  changed[page] |= labelled_here;
   if (in_view_here != 0) atomic_add(&counts[COUNT_IN_VIEW], (uint)popcount(in_view_here));
   if (large_here != 0) atomic_add(&counts[COUNT_LARGE], (uint)popcount(large_here));
   if (removed_here != 0) atomic_add(&counts[COUNT_REMOVED], (uint)popcount(removed_here));
+  if (labelled_here != 0) atomic_add(&counts[COUNT_LABELLED], (uint)popcount(labelled_here));
 }

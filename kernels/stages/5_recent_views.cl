@@ -226,8 +226,8 @@ INLINE int ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __globa
 //   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared
 __kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
                                 __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                                __global const int* tables, __global const int* bricks, __global ushort* tile_views, __global uchar* tile_seen,
-                                __global ulong* candidates) {
+                                __global const int* tables, __global const int* bricks, __global ushort* tile_views,
+                                __global uchar* tile_seen, __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
   const int group = get_group_id(0), tiles_i = grid_tiles(f.grid.size_i);

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <vector>
 
 namespace frontier_surfels::replay {
 
@@ -12,19 +13,26 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 
-/// Runs `read`, which parses the command line, and rethrows what it throws. Prints the usage before: on standard output if help was asked
-/// for, on standard error after a mistake.
+/// Checks that all long options are known, before anything else that may be wrong. The sentence names the nearest known option.
+/// @throws CLI::ExtrasError
+void check_option_names(const CLI::App& app, const std::vector<std::string>& arguments);
+
+/// Runs `read`, which parses the command line, and rethrows what it throws. Prints the help on standard output if it was asked for.
+/// @param arguments  of the program, without its name, in any order
 template <typename Read>
-void read_arguments(const CLI::App& app, Read read) {
+void read_arguments(const CLI::App& app, const std::vector<std::string>& arguments, Read read) {
   try {
+    check_option_names(app, arguments);
     read();
   } catch (const CLI::CallForHelp&) {
     std::cout << app.help();
     throw;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) std::cerr << app.help() << "\n";
-    throw;
   }
+}
+
+/// Parses the command line of a program that has nothing else to check. @throws CLI::Error (also for help, with exit code 0)
+inline void parse_arguments(CLI::App& app, int argc, char** argv) {
+  read_arguments(app, {argv + 1, argv + argc}, [&] { app.parse(argc, argv); });
 }
 
 /// Runs a command. Prints one sentence if it throws.
@@ -37,7 +45,7 @@ int run_command(const std::string& name, const std::string& if_out_of_memory, Co
     return kDone;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return kDone;
-    std::cerr << name << ": " << error.what() << "\n";
+    std::cerr << name << ": " << error.what() << "\nUsage: " << name << " --help lists the arguments.\n";
     return kWrongUsage;
   } catch (const std::bad_alloc&) {
     std::cerr << name << ": out of memory: " << if_out_of_memory << "\n";

@@ -7,6 +7,8 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
+#include "apps/command.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "synthetic/synthetic_room.hpp"
 
 namespace fs = std::filesystem;
@@ -54,6 +56,12 @@ void write_image(const fs::path& path, const cv::Mat& image) {
   if (!written) throw FileError(path.string() + " cannot be written: check that the folder is yours and has space.");
 }
 
+void make_folder(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw FileError(path.string() + " cannot be made: " + error.message() + "; choose another folder.");
+}
+
 void write_camera(const fs::path& path, const frontier_surfels::Intrinsics& camera) {
   std::ofstream file = open_text(path);
   file << camera.fx << ' ' << camera.fy << ' ' << camera.cx << ' ' << camera.cy << ' ' << camera.width << ' ' << camera.height << '\n';
@@ -70,12 +78,11 @@ void write_pose(std::ofstream& file, const replay::RecordedFrame& frame) {
 void write_sequence(const Options& options) {
   auto camera = replay::synthetic_camera(options.width, options.height);
   if (options.focal > 0) camera.fx = camera.fy = options.focal;
-  const fs::path folder = options.output;
-  if (fs::exists(folder / "depth") && !fs::is_empty(folder / "depth")) {
+  const fs::path folder = frontier_surfels::absolute_path(options.output);
+  make_folder(folder / "depth");
+  if (!fs::is_empty(folder / "depth"))
     throw FileError((folder / "depth").string() + " already has images: choose another folder, or remove it.");
-  }
-  fs::create_directories(folder / "depth");
-  fs::create_directories(folder / "color");
+  make_folder(folder / "color");
   write_camera(folder / "camera.txt", camera);
   std::ofstream poses = open_text(folder / "poses.txt");
   poses << "# timestamp tx ty tz qx qy qz qw (camera to world, optical frame)\n";
@@ -90,15 +97,15 @@ void write_sequence(const Options& options) {
     write_pose(poses, frame);
   }
   close_text(poses, folder / "poses.txt");
-  std::printf("%d frames are in %s.\n", options.frames, options.output.c_str());
+  std::printf("%d frames are in %s.\n", options.frames, folder.c_str());
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.");
-  app.failure_message(CLI::FailureMessage::help);
+  CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.",
+               "make_synthetic");
   app.option_defaults()->always_capture_default();
   app.add_option("OUT", options.output, "folder to write")->required();
   app.add_option("--frames", options.frames, "number of frames along the whole path")->check(CLI::Range(1, 999999));
@@ -124,16 +131,8 @@ int main(int argc, char** argv) {
   app.add_option("--size", size, "width and height of the images [pixel]")->check([&](const std::string& text) {
     return read_size(text, options.width, options.height);
   });
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  return replay::run_command("make_synthetic", "make smaller images (--size).", [&] {
+    replay::parse_arguments(app, argc, argv);
     write_sequence(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

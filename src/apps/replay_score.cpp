@@ -1,16 +1,19 @@
 /// replay_score: maps a recording, scores the map, and writes a report.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <optional>
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "config/config_text.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "frontier_surfels/ply.hpp"
 #include "replay/live_replay.hpp"
+#include "replay/report_folder.hpp"
 #include "replay/report_page.hpp"
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
@@ -29,7 +32,7 @@ struct Options {
   Recording recording;
   std::string report;  ///< folder of the report
   Config config;
-  double octomap_resolution = 0.01;  ///< voxel size [m]; 0: no OctoMap
+  OctomapResolution octomap_resolution;
   bool exact = true;
   std::optional<Sweep> sweep;
   std::optional<LiveOptions> live;
@@ -42,6 +45,7 @@ struct RawOptions {
   std::optional<int> threads;
   std::string sweep;
   std::string mapper;
+  std::string octomap_resolution = "auto";
   bool no_exact = false;
   bool live = false;
 };
@@ -75,8 +79,9 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's camera_info")->type_name("T");
   app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
   app.add_option("--world-frame", source.world_frame, "bags: tf frame of the map")->type_name("F");
-  app.add_option("--octomap-resolution", options.octomap_resolution,
-                 "voxel size [m] of the OctoMap that is built for comparison, default 0.01; 0: none")
+  app.add_option("--octomap-resolution", raw.octomap_resolution,
+                 "voxel size [m] of the OctoMap that is built for comparison; 0: none; default auto: the distance between pixels at z_max, "
+                 "where OctoMap has no gaps between rays")
       ->type_name("M");
   app.add_flag("--no-exact", raw.no_exact, "leave out the exact test");
   app.add_option("--threads", raw.threads, "number of threads of the mapper and the scores; 0: all")
@@ -112,6 +117,16 @@ void read_config(const RawOptions& raw, Config& config) {
   if (!problems.empty()) throw CLI::ValidationError("", problems);
 }
 
+/// @throws CLI::ValidationError
+OctomapResolution octomap_resolution(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  double resolution = NAN;
+  // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
+  if (!from_text(text, resolution) || (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10)))
+    throw CLI::ValidationError("--octomap-resolution", "must be auto, 0, or from 0.0001 to 10 m");
+  return resolution;
+}
+
 /// @throws CLI::ValidationError if parameters of the mapper are given: a running mapper has its own
 LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& ros_arguments) {
   if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
@@ -138,14 +153,13 @@ Options parse(int argc, char** argv) {
   CLI::App app("Maps a recording, scores the map, and writes summary.json, frames.csv, surfels.ply, octomap.ply and report.html.",
                "replay_score");
   declare_options(app, options, raw);
-  read_arguments(app, [&] {
+  read_arguments(app, {arguments.rbegin(), arguments.rend()}, [&] {
     app.parse(arguments);
+    // With --report=~/x and in launch files no shell has expanded the `~`.
+    for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
-    // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
-    const double resolution = options.octomap_resolution;
-    if (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10))
-      throw CLI::ValidationError("--octomap-resolution", "must be 0, or from 0.0001 to 10 m");
+    options.octomap_resolution = octomap_resolution(raw.octomap_resolution);
     read_config(raw, options.config);
     options.exact = !raw.no_exact;
     if (raw.live) options.live = live_options(raw, ros_arguments);
@@ -158,21 +172,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-/// Makes the folder, checks that it can be written before a long run starts, and removes the files of an earlier run.
-void prepare_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  const fs::path probe = folder / "summary.json";
-  if (!fs::is_directory(folder) || !std::ofstream(probe)) {
-    throw FileError("The report's folder '" + folder.string() + "' cannot be made or written: choose another with --report.");
-  }
-  for (const char* name :
-       {"summary.json", "frames.csv", "trajectory.txt", "surfels.ply", "octomap.ply", "verdicts.bin", "sweep.json", "report.html"}) {
-    fs::remove(folder / name, error);
-  }
-}
-
-/// Writes what is known before the map is scored, so that it is kept if scoring is interrupted.
+/// Writes what is known before the map is scored, so that it is kept if the program is ended while it scores.
 void write_map(const fs::path& folder, const Run& run) {
   write_ply(folder / "surfels.ply", run.surfels);
   write_file(folder / "frames.csv", frames_csv(run.frames));
@@ -194,11 +194,10 @@ void tell_skipped(const std::vector<std::string>& skipped) {
 }
 
 void replay_and_score(const Options& options) {
-  const fs::path folder = options.report;
   catch_first_interrupt();
   auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
   const Config config = live ? live->config() : options.config;
-  prepare_folder(folder);
+  ReportFolder folder(options.report);
 
   Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
   const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
@@ -206,19 +205,23 @@ void replay_and_score(const Options& options) {
   tell_skipped(run.skipped);
   if (run.stopped)
     std::cerr << "Stopped after " << run.frames.size() << " frames, which are now scored and written. Press Ctrl-C again to end at once.\n";
-  write_map(folder, run);
+  write_map(folder.unfinished(), run);
 
-  const Scores scores = score(run.surfels, yardsticks, config.threads);
-  const auto summary = summary_json(options.recording, options.octomap_resolution, run, yardsticks, scores);
-  write_scores(folder, yardsticks, scores, summary);
+  const bool is_empty = run.surfels.empty();
+  const Scores scores = is_empty ? Scores() : score(run.surfels, yardsticks, config.threads);
+  const auto summary = summary_json(options.recording, run, yardsticks, scores);
+  write_scores(folder.unfinished(), yardsticks, scores, summary);
   std::cout << result_table(summary) << std::flush;
 
-  if (options.sweep && !run.stopped) {
+  if (options.sweep && !run.stopped && !is_empty) {
     const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
-    write_file(folder / "sweep.json", sweep.dump(2) + "\n");
+    write_file(folder.unfinished() / "sweep.json", sweep.dump(2) + "\n");
   }
-  make_report_page(folder);
-  std::cout << "report      " << (folder / "report.html").string() << "\n";
+  folder.commit();
+  make_report_page(options.report);
+  std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
+  if (!run.unsaved.empty()) throw FileError(run.unsaved);
+  if (is_empty) throw empty_map(options.recording, summary);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "apps/command.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "recordings/bag_writer.hpp"
 #include "recordings/frame_source.hpp"
 
@@ -13,12 +15,13 @@ int main(int argc, char** argv) {
   replay::BagOptions options;
   bool no_slashes = false;
 
-  CLI::App app("Writes a recorded sequence as a bag, with the topics and tf frames of the TUM RGB-D benchmark's bags.");
-  app.failure_message(CLI::FailureMessage::help);
+  CLI::App app("Writes a recorded sequence as a bag, with the topics and tf frames of the TUM RGB-D benchmark's bags.", "sequence_to_bag");
   app.option_defaults()->always_capture_default();
   app.add_option("FOLDER", folder, "folder of the recording: depth/ + poses.txt + camera.txt, or TUM RGB-D layout")->required();
   app.add_option("OUT.bag", output, "bag to write")->required();
   app.add_option("--encoding", options.encoding, "encoding of the depth images")->check(CLI::IsMember({"32FC1", "16UC1"}));
+  app.add_option("--depth-unit", options.depth_unit, "one step of the folder's 16-bit depth images [m]; TUM RGB-D layout has its own")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--compressed", options.compressed,
                "write compressedDepth and JPEG images instead of raw ones; depth as 32FC1 is then quantised");
   app.add_option("--compression", options.compression, "compression of the bag")->check(CLI::IsMember({"none", "lz4", "bz2"}));
@@ -31,23 +34,15 @@ int main(int argc, char** argv) {
   app.add_option("--first", source_options.first, "index of the first frame");
   app.add_option("--last", source_options.last, "index of the last frame; -1: the end");
   app.add_option("--stride", source_options.stride, "use every N-th frame");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  options.leading_slashes = !no_slashes;
-
-  try {
+  return replay::run_command("sequence_to_bag", "the images are too large for this machine.", [&] {
+    replay::parse_arguments(app, argc, argv);
+    options.leading_slashes = !no_slashes;
+    for (std::string* path : {&folder, &output}) *path = frontier_surfels::absolute_path(*path);
     const auto source = replay::open_source(folder, source_options);
     const replay::BagSummary summary = replay::write_bag(*source, output, options);
     for (const std::string& sentence : source->notes()) std::printf("%s\n", sentence.c_str());
     for (const std::string& sentence : source->skipped()) std::printf("%s\n", sentence.c_str());
     if (summary.stamp_shift != 0) std::printf("All stamps are shifted by %.0f s, because ROS has no time 0.\n", summary.stamp_shift);
     std::printf("%zu frames are in %s.\n", summary.frames, output.c_str());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

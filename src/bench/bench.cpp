@@ -8,6 +8,7 @@
 #include "apps/interrupt.hpp"
 #include "bench/sections.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::bench {
@@ -66,8 +67,10 @@ Options parse(int argc, char** argv) {
   Options options;
   CLI::App app("Measures what a frame costs: prints tables, and writes JSON.", "bench");
   declare_options(app, options);
-  replay::read_arguments(app, [&] {
+  replay::read_arguments(app, {argv + 1, argv + argc}, [&] {
     app.parse(argc, argv);
+    for (std::string& input : options.inputs) input = absolute_path(input);
+    for (std::string* path : {&options.config_file, &options.json}) *path = absolute_path(*path);
     if (!options.config_file.empty()) options.config = load_config(options.config_file);
     std::string problems;
     for (const std::string& problem : options.config.problems()) problems += problem + "\n";

@@ -37,10 +37,10 @@ ordered_json exact_json(const scoring::ExactScore& score) {
 
 void print_row(const Table& table, const ordered_json& row) {
   const auto& exact = row["exact"];
-  table.row({row["input"], std::to_string(std::size_t(row["first_frame"])), fixed(row["time_ms"]["median"], 1), fixed(row["time_ms"]["p95"], 1),
-             fixed(row["time_ms"]["max"], 1), std::to_string(std::size_t(row["surfels"])), fixed(double(row["seen_bytes"]) / 1e6, 1),
-             fixed(100 * double(exact["right"]), 2), fixed(100 * double(exact["buried"]), 2), fixed(100 * double(exact["fdr_5cm"]), 3),
-             fixed(100 * double(exact["miss_2cm"]), 3)});
+  table.row({row["input"], std::to_string(std::size_t(row["first_frame"])), fixed(row["time_ms"]["median"], 1),
+             fixed(row["time_ms"]["p95"], 1), fixed(row["time_ms"]["max"], 1), std::to_string(std::size_t(row["surfels"])),
+             fixed(double(row["seen_bytes"]) / 1e6, 1), fixed(100 * double(exact["right"]), 2), fixed(100 * double(exact["buried"]), 2),
+             fixed(100 * double(exact["fdr_5cm"]), 3), fixed(100 * double(exact["miss_2cm"]), 3)});
 }
 
 }  // namespace
@@ -55,7 +55,8 @@ ordered_json measure_long(const Options& options, const std::vector<Input>& inpu
     scoring::ExactTest exact(config.z_min, config.z_max, config.decimation);
     for (const auto& frame : frames) exact.add(frame.view());
     Mapper mapper(config);
-    const std::size_t length = options.quick ? 20 : static_cast<std::size_t>(options.long_frames), window = options.quick ? 10 : kLongWindow;
+    const std::size_t length = options.quick ? 20 : static_cast<std::size_t>(options.long_frames),
+                      window = options.quick ? 10 : kLongWindow;
     std::vector<double> times;
     for (std::size_t n = 0; n < length && !replay::stop_requested(); ++n) {
       const Report report = mapper.integrate(frames[to_and_fro(n, frames.size())].view());

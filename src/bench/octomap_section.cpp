@@ -28,7 +28,7 @@ ordered_json measure_row(const Options& options, const Input& input) {
     // same amount of new space in each.
     const auto source = input.open(options.octomap_frames);
     Mapper mapper(config);
-    scoring::OctomapTruth octomap(resolution, config.z_min, config.z_max, config.decimation);
+    scoring::OctomapTruth octomap(resolution, config);
     const auto run = run_frames(mapper, *source, options,
                                 [&](const DepthFrame& frame, replay::FrameRecord& record) { record.octomap = octomap.add(frame); });
     add_figures(run, row);

@@ -12,7 +12,7 @@ struct Options {
   std::vector<std::string> inputs;  ///< bags and folders; empty: a synthetic room
   int frames = 100;                 ///< used of each input; 0: all
   int octomap_frames = 20;          ///< used for OctoMap; 0: all of `frames`
-  int long_frames = 10000;   ///< of the section "long"
+  int long_frames = 10000;          ///< of the section "long"
   double row_seconds = 120;         ///< longest time for one row of a table [s]
   std::vector<std::string> sections;
   std::string json;  ///< file; empty: none

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "frontier_surfels/number_text.hpp"
+
 namespace frontier_surfels::bench {
 namespace {
 
@@ -28,10 +30,6 @@ void Table::row(const std::vector<std::string>& cells) const {
   std::fflush(stdout);
 }
 
-std::string fixed(double value, int digits) {
-  char text[64];
-  std::snprintf(text, sizeof(text), "%.*f", digits, value);
-  return text;
-}
+std::string fixed(double value, int digits) { return fixed_text(value, digits); }
 
 }  // namespace frontier_surfels::bench

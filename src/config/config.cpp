@@ -1,6 +1,7 @@
 #include "frontier_surfels/config.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <locale>
@@ -35,7 +36,36 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+/// Reads a number, also one with 0x, as yaml-cpp does.
+template <typename Number>
+bool read_number(const std::string& text, Number& value) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  stream.unsetf(std::ios::dec);
+  Number number = 0;
+  if (!(stream >> std::noskipws >> number) || !(stream >> std::ws).eof()) return false;
+  value = number;
+  return true;
+}
+
 }  // namespace
+
+bool from_text(const std::string& text, int& value) { return read_number(text, value); }
+
+bool from_text(const std::string& text, double& value) {
+  using Limits = std::numeric_limits<double>;
+  const auto is_word = [](std::string word, const char* lower, const char* title, const char* upper) {
+    if (!word.empty() && (word[0] == '+' || word[0] == '-')) word.erase(0, 1);
+    return word == lower || word == title || word == upper;
+  };
+  if (is_word(text, ".inf", ".Inf", ".INF"))
+    value = text[0] == '-' ? -Limits::infinity() : Limits::infinity();
+  else if (text[0] == '.' && is_word(text, ".nan", ".NaN", ".NAN"))
+    value = Limits::quiet_NaN();
+  else
+    return read_number(text, value);
+  return true;
+}
 
 std::string to_text(double value) {
   if (std::isnan(value)) return ".nan";

@@ -1,4 +1,4 @@
-/// Config from and to YAML text. Types and names come from for_each_field, conversions from yaml-cpp.
+/// Config from and to YAML text. Types and names come from for_each_field, the syntax from yaml-cpp.
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -19,13 +19,21 @@ const char* type_text(int) { return "a whole number"; }
 const char* type_text(double) { return "a number"; }
 const char* type_text(const std::string&) { return "text"; }
 
+/// yaml-cpp itself would read numbers in the program's locale.
+bool decode(const YAML::Node& value, int& field) { return from_text(value.Scalar(), field); }
+bool decode(const YAML::Node& value, double& field) { return from_text(value.Scalar(), field); }
+template <typename Field>
+bool decode(const YAML::Node& value, Field& field) {
+  return YAML::convert<Field>::decode(value, field);
+}
+
 /// Sets the field `name`. @return a sentence that says what is wrong, or empty
 std::string assign(Config& config, const std::string& name, const YAML::Node& value) {
   std::string fault = "there is no parameter '" + name + "'" + suggestion(name);
   for_each_field(config, [&](const FieldInfo& info, auto& field) {
     if (name != info.name) return;
     fault.clear();
-    if (!value.IsScalar() || !YAML::convert<std::decay_t<decltype(field)>>::decode(value, field)) {
+    if (!value.IsScalar() || !decode(value, field)) {
       const std::string given = value.IsScalar() ? "'" + value.Scalar() + "'" : value.IsNull() ? "empty" : "a list or a map";
       fault = name + " is " + given + ": it must be " + type_text(field) + (*info.unit ? std::string(" [") + info.unit + "]." : ".");
     }

@@ -5,7 +5,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kMaxCameras = 16;  // limits the memory if a driver changes its intrinsics with every frame
+constexpr double kLeastBytesPerVoxel = 1.5;  // of the device's memory; small grids need more
+constexpr std::size_t kMaxCameras = 16;      // limits the memory if a driver changes its intrinsics with every frame
 
 }  // namespace
 
@@ -29,6 +30,11 @@ void Camera::set_image(const WorkingImage& image) {
   depth_.send(image.depth);
   color_.send(image.color);
   has_color_ = !image.color.empty();
+}
+
+Cameras::Cameras(Commands& commands, const Config& config) : commands_(commands), config_(config) {
+  const double bytes = static_cast<double>(commands.device().device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>());
+  max_voxels_ = std::min(kMaxVoxels, bytes / kLeastBytesPerVoxel);
 }
 
 Camera& Cameras::find(const Intrinsics& intrinsics) {

@@ -15,7 +15,6 @@ namespace frontier_surfels {
 class Camera {
  public:
   /// @param intrinsics  of the working image
-  /// @throws BadFrame   the grid would be too large
   Camera(Commands& commands, const Intrinsics& intrinsics, const Config& config);
 
   /// Sends a frame's working image to the device. Its intrinsics must be this camera's.
@@ -52,15 +51,18 @@ class Camera {
 /// The cameras of recent frames. Cameras that take turns keep their tables.
 class Cameras {
  public:
-  Cameras(Commands& commands, const Config& config) : commands_(commands), config_(config) {}
+  Cameras(Commands& commands, const Config& config);
+
+  /// Largest number of a grid's voxels for which the device has memory.
+  double max_voxels() const { return max_voxels_; }
 
   /// Finds the camera with these intrinsics (of its working image), or makes one. The reference is valid until the next call.
-  /// @throws BadFrame  the grid would be too large
   Camera& find(const Intrinsics& intrinsics);
 
  private:
   Commands& commands_;
   const Config config_;
+  double max_voxels_;
   std::list<Camera> cameras_;  ///< most recently used first
 };
 

@@ -13,7 +13,7 @@ Limits make_limits(const Config& config) {
   limits.thickness = static_cast<float>(config.thickness);
   limits.hull_unknown_scale = 1.5F;
   limits.split_radius = 2 * std::sqrt(3.0F);
-  limits.create_radius = std::sqrt(3.0F) / 2;
+  limits.create_radius = static_cast<float>(kNewRadius);
   limits.normal_min = 0.01F;
   limits.back_probe = static_cast<float>(kBackProbe);
   limits.front_probe = static_cast<float>(kFrontProbe) * limits.create_radius;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "frontier_surfels/number_text.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -25,7 +27,8 @@ std::vector<float> find_block_depths(const WorkingImage& image, Choose choose) {
       for (int s = 0; s < width; ++s) of_columns[s] = t == row ? std::abs(depth[s]) : choose(of_columns[s], std::abs(depth[s]));
     }
     for (int column = 0; column < width; column += VIEW_BLOCK)
-      blocks.push_back(std::accumulate(&of_columns[column], &of_columns[0] + std::min(column + VIEW_BLOCK, width), of_columns[column], choose));
+      blocks.push_back(
+          std::accumulate(&of_columns[column], &of_columns[0] + std::min(column + VIEW_BLOCK, width), of_columns[column], choose));
   }
   return blocks;
 }
@@ -132,7 +135,7 @@ void RecentViews::enlarge_rooms(std::size_t size) {
   const std::size_t rooms = config_.recent_views + 1;
   const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
   if (pixels > std::numeric_limits<std::int32_t>::max())  // pixels are numbered with 32 bits
-    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + std::to_string(pixels * 1e-9) +
+    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + fixed_text(pixels * 1e-9, 6) +
                    " billion pixels, more than 2 billion; raise decimation or lower recent_views.");
   std::size_t used = 0;
   for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);

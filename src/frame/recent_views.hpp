@@ -52,8 +52,8 @@ class RecentViews {
   std::vector<std::uint64_t> numbers() const;
   SavedView saved(std::uint64_t number) const;  ///< a kept view
 
-  /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on the
-  /// device until the next set_current(). None if it has no depth, or if a kept view was not replaced.
+  /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on
+  /// the device until the next set_current(). None if it has no depth, or if a kept view was not replaced.
   const std::optional<ForgottenView>& forgotten() const { return forgotten_; }
   View view_of(const ForgottenView& view, const Eigen::Isometry3d& T_camera_local) const;  ///< as seen from the frame `local`
 

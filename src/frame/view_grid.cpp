@@ -2,9 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
+
+constexpr int kMaxPixels = 16384;   // a row or column; the cuboid's tables number pixels with 16 bits
+constexpr int kMaxDecimation = 64;  // see Config
+
+double focal_length(const Intrinsics& camera) { return (camera.fx + camera.fy) / 2; }
+
+double layers_of(const Intrinsics& camera, const Config& config) {
+  const double f = focal_length(camera);
+  return std::ceil(f * std::log(config.z_max / config.z_min) + config.padding_k + f) + 1;
+}
+
+/// Number of voxels for which there must be room: layers come in words of 64.
+double voxels_of(const Intrinsics& camera, const Config& config) {
+  const double size_i = camera.width + 2.0 * config.padding_i, size_j = camera.height + 2.0 * config.padding_j;
+  return size_i * size_j * (layers_of(camera, config) + 64);
+}
+
+/// A number of voxels in billions, with a digit.
+std::string billions(double voxels) { return fixed_text(voxels * 1e-9, 1); }
 
 /// An axis of the cuboid and of the image.
 struct Axis {
@@ -46,20 +68,37 @@ std::vector<PixelRange> find_words(const std::vector<PixelRange>& pixels) {
 
 }  // namespace
 
-ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
-  const double f = (camera.fx + camera.fy) / 2, k_min = config.padding_k + f;
-  const double size_k = std::ceil(f * std::log(config.z_max / config.z_min) + k_min) + 1;
-  const double size_i = camera.width + 2 * config.padding_i, size_j = camera.height + 2 * config.padding_j;
-  constexpr double kMaxVoxels = 2e9;  // voxels are numbered with 32 bits
-  if (size_i * size_j * (size_k + 64) > kMaxVoxels)
-    throw BadFrame("The view's grid would have " + std::to_string(size_i * size_j * size_k * 1e-9) +
-                   " billion voxels, more than 2 billion; raise decimation or lower z_max.");
+Intrinsics decimated(const Intrinsics& full, int step) {
+  return {full.fx / step, full.fy / step, full.cx / step, full.cy / step, full.width / step, full.height / step};
+}
 
+void check_grid_size(const Intrinsics& full, const Config& config, double max_voxels) {
+  const auto fits = [&](int step) {
+    const Intrinsics camera = decimated(full, step);
+    return std::max(camera.width, camera.height) <= kMaxPixels && voxels_of(camera, config) <= max_voxels;
+  };
+  if (fits(config.decimation)) return;
+
+  const Intrinsics camera = decimated(full, config.decimation);
+  const bool has_too_many_pixels = std::max(camera.width, camera.height) > kMaxPixels;
+  std::string text = "The depth image of " + std::to_string(full.width) + " x " + std::to_string(full.height) + " pixels is too large: ";
+  text += has_too_many_pixels ? "rows and columns can have " + std::to_string(kMaxPixels) + " pixels after decimation. "
+                              : "its grid would have " + billions(voxels_of(camera, config)) +
+                                    " billion voxels, but this device has room for " + billions(max_voxels) + ". ";
+  const int largest = std::min({kMaxDecimation, full.width, full.height});
+  int step = config.decimation + 1;
+  while (step <= largest && !fits(step)) ++step;
+  text += step <= largest ? "Set decimation to " + std::to_string(step) : "No decimation would do: scale the images down";
+  throw BadFrame(text + (has_too_many_pixels ? "." : ", or lower z_max."));
+}
+
+ViewGrid make_view_grid(const Intrinsics& camera, const Config& config) {
+  const double f = focal_length(camera), k_min = config.padding_k + f;
   ViewGrid view;
   Grid& g = view.grid;
-  g.size_i = static_cast<int>(size_i);
-  g.size_j = static_cast<int>(size_j);
-  g.size_k = static_cast<int>(size_k);
+  g.size_i = camera.width + 2 * config.padding_i;
+  g.size_j = camera.height + 2 * config.padding_j;
+  g.size_k = static_cast<int>(layers_of(camera, config));
   g.words_k = (g.size_k + 63) / 64;
   g.width = camera.width;
   g.height = camera.height;

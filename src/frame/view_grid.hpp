@@ -24,8 +24,19 @@ struct ViewGrid {
   std::vector<PixelRange> words_i;   ///< [layers][chunks]: range of 32-pixel words with the columns of a chunk
 };
 
-/// @param intrinsics  of the working image
-/// @throws BadFrame  the grid would be too large
+/// Largest number of a grid's voxels, which are numbered with 32 bits.
+constexpr double kMaxVoxels = 2e9;
+
+/// The intrinsics of every step-th pixel in both directions.
+Intrinsics decimated(const Intrinsics& full, int step);
+
+/// Checks the size of the grid of a depth image, before memory is asked for. The sentence says which decimation would do.
+/// @param full        intrinsics before decimation
+/// @param max_voxels  for which there is memory, at most kMaxVoxels
+/// @throws BadFrame
+void check_grid_size(const Intrinsics& full, const Config& config, double max_voxels);
+
+/// @param intrinsics  of the working image, of a size that check_grid_size() accepts
 ViewGrid make_view_grid(const Intrinsics& intrinsics, const Config& config);
 
 }  // namespace frontier_surfels

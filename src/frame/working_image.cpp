@@ -1,8 +1,11 @@
 #include "frame/working_image.hpp"
 
 #include <cmath>
-#include <cstring>
 #include <string>
+
+#include "frame/depth_pixels.hpp"
+#include "frame/view_grid.hpp"
+#include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -10,14 +13,10 @@ namespace {
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 void check_depth(const DepthImage& image, const Config& config) {
-  const std::size_t pixel = image.encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4;
+  const std::size_t pixel = image.encoding == DepthImage::Encoding::kStepsU16 ? 2 : 4;
   if (image.width < config.decimation || image.height < config.decimation)
     throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is smaller than one pixel after decimation by " +
                    std::to_string(config.decimation) + "; lower decimation.");
-  constexpr int kLargest = 16384;  // [pixel]; pixel numbers in the cuboid's tables have 16 bits
-  if (image.width > kLargest || image.height > kLargest)
-    throw BadFrame("The depth image of " + size_text(image.width, image.height) + " pixels is larger than " +
-                   size_text(kLargest, kLargest) + ".");
   if (image.data == nullptr) throw BadFrame("The depth image has no data.");
   if (image.step < image.width * pixel)
     throw BadFrame("The depth image's rows of " + std::to_string(image.step) + " bytes are shorter than its " +
@@ -27,10 +26,10 @@ void check_depth(const DepthImage& image, const Config& config) {
 void check_intrinsics(const Intrinsics& k, const DepthImage& image) {
   constexpr double kMaxPrincipalPoint = 1e6, kMinFocalLength = 1e-3;  // [pixel]; beyond these floats overflow
   if (!(k.fx >= kMinFocalLength && k.fy >= kMinFocalLength && std::isfinite(k.fx) && std::isfinite(k.fy)))
-    throw BadFrame("The focal lengths " + std::to_string(k.fx) + ", " + std::to_string(k.fy) +
+    throw BadFrame("The focal lengths " + fixed_text(k.fx, 6) + ", " + fixed_text(k.fy, 6) +
                    " must be positive: is the camera calibrated, and its camera_info published?");
   if (!(std::abs(k.cx) <= kMaxPrincipalPoint && std::abs(k.cy) <= kMaxPrincipalPoint))
-    throw BadFrame("The principal point " + std::to_string(k.cx) + ", " + std::to_string(k.cy) +
+    throw BadFrame("The principal point " + fixed_text(k.cx, 6) + ", " + fixed_text(k.cy, 6) +
                    " of the camera is not a number or far outside the image: is its camera_info right?");
   if (k.width != image.width || k.height != image.height)
     throw BadFrame("The intrinsics are for " + size_text(k.width, k.height) + " pixels and the depth image has " +
@@ -56,17 +55,6 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
-float to_metres(std::uint16_t millimetres, bool swap_bytes) {
-  return static_cast<float>(swap_bytes ? __builtin_bswap16(millimetres) : millimetres) / 1000.0F;
-}
-
-float to_metres(std::uint32_t bits, bool swap_bytes) {
-  if (swap_bytes) bits = __builtin_bswap32(bits);
-  float metres;
-  std::memcpy(&metres, &bits, sizeof(metres));
-  return metres;
-}
-
 /// Meaning of a raw depth [m]: > 0 a surface at this depth, < 0 free space up to its magnitude, 0 no measurement.
 float interpret(float d, const Config& config) {
   const float z_max = static_cast<float>(config.z_max);
@@ -80,14 +68,8 @@ template <typename Pixel>
 std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
   std::vector<float> depth;
   depth.reserve(static_cast<std::size_t>(width) * height);
-  for (int t = 0; t < height; ++t) {
-    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * config.decimation * image.step;
-    for (int s = 0; s < width; ++s, row += config.decimation * sizeof(Pixel)) {
-      Pixel pixel;
-      std::memcpy(&pixel, row, sizeof(pixel));
-      depth.push_back(interpret(to_metres(pixel, image.swap_bytes), config));
-    }
-  }
+  for_each_pixel<Pixel>(image, config.decimation,
+                        [&](Pixel pixel) { depth.push_back(interpret(to_metres(pixel, config.depth_unit), config)); });
   return depth;
 }
 
@@ -108,20 +90,19 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }
 
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config) {
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels) {
   check_depth(frame.depth, config);
   check_intrinsics(frame.intrinsics, frame.depth);
+  check_grid_size(frame.intrinsics, config, max_voxels);
   check_pose(frame.T_world_camera);
   if (frame.color) check_color(*frame.color, frame.depth);
 
-  const int step = config.decimation, width = frame.depth.width / step, height = frame.depth.height / step;
-  const Intrinsics& full = frame.intrinsics;
   WorkingImage image;
-  image.intrinsics = {full.fx / step, full.fy / step, full.cx / step, full.cy / step, width, height};
-  image.depth = frame.depth.encoding == DepthImage::Encoding::kMillimetresU16
-                    ? read_depth<std::uint16_t>(frame.depth, width, height, config)
-                    : read_depth<std::uint32_t>(frame.depth, width, height, config);
-  if (frame.color) image.color = read_color(*frame.color, width, height, step);
+  image.intrinsics = decimated(frame.intrinsics, config.decimation);
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
+  image.depth = frame.depth.encoding == DepthImage::Encoding::kStepsU16 ? read_depth<std::uint16_t>(frame.depth, width, height, config)
+                                                                        : read_depth<std::uint32_t>(frame.depth, width, height, config);
+  if (frame.color) image.color = read_color(*frame.color, width, height, config.decimation);
   return image;
 }
 

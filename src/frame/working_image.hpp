@@ -19,8 +19,9 @@ struct WorkingImage {
 bool same_camera(const Intrinsics& a, const Intrinsics& b);
 
 /// Takes every decimation-th pixel in both directions, without averaging, and divides the intrinsics by the decimation.
+/// @param max_voxels  see check_grid_size()
 /// @throws BadFrame  a sentence that names what is wrong with the frame
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config);
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels);
 
 /// The working image of a saved view.
 WorkingImage working_image_of(const SavedView& view);

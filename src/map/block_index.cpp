@@ -23,28 +23,57 @@ std::uint32_t BlockIndex::add_page(const BlockKey& block) {
   return page;
 }
 
-void BlockIndex::remove_page(const BlockKey& block, std::uint32_t page) {
+void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_t end) {
+  const auto found = blocks_.find(block);
+  found->second.pop_back();
+  if (found->second.empty()) blocks_.erase(found);
+  if (page >= end)
+    --end_;
+  else
+    free_.push_back(page);
+}
+
+void BlockIndex::remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame) {
   const auto found = blocks_.find(block);
   if (found == blocks_.end()) return;
   Pages& pages = found->second;
   const auto at = std::find(pages.begin(), pages.end(), page);
   if (at == pages.end()) return;
-  free_.push_back(page);
+  if (frame == 0)
+    free_.push_back(page);
+  else
+    removed_.emplace_back(frame, page);
   pages.erase(at);
   if (pages.empty()) blocks_.erase(found);
 }
 
-void BlockIndex::skip_to(std::size_t end) {
-  const Pages free = free_;
-  free_.clear();
-  for (auto page = static_cast<std::uint32_t>(end); page > end_;) free_.push_back(--page);  // descending, as add_page() takes the last
-  free_.insert(free_.end(), free.begin(), free.end());
-  end_ = std::max(end_, static_cast<std::uint32_t>(end));
+void BlockIndex::release(std::uint64_t frame) {
+  const auto stays = [&](const auto& removed) { return removed.first > frame; };
+  const auto released = std::stable_partition(removed_.begin(), removed_.end(), stays);
+  for (auto at = released; at != removed_.end(); ++at) free_.push_back(at->second);
+  removed_.erase(released, removed_.end());
+}
+
+BlockIndex BlockIndex::emptied(std::uint32_t frame) const {
+  BlockIndex empty;
+  empty.end_ = end_;
+  if (frame == 0) {
+    for (std::uint32_t page = end_; page > 0;) empty.free_.push_back(--page);
+    return empty;
+  }
+  empty.free_ = free_;
+  std::sort(empty.free_.rbegin(), empty.free_.rend());  // descending, as add_page() takes the last
+  empty.removed_ = removed_;
+  for (const auto& [block, pages] : blocks_)
+    for (const std::uint32_t page : pages) empty.removed_.emplace_back(frame, page);
+  std::sort(empty.removed_.begin(), empty.removed_.end());  // the table of blocks has no order
+  return empty;
 }
 
 std::size_t BlockIndex::bytes() const {
   constexpr std::size_t kNode = sizeof(BlockKey) + sizeof(Pages) + 2 * sizeof(void*) + 8;  // of the hash table, with its bucket
-  return blocks_.size() * kNode + used() * 2 * sizeof(std::uint32_t) + free_.capacity() * sizeof(std::uint32_t);
+  return blocks_.size() * kNode + used() * 2 * sizeof(std::uint32_t) + free_.capacity() * sizeof(std::uint32_t) +
+         removed_.capacity() * sizeof(removed_[0]);
 }
 
 }  // namespace frontier_surfels

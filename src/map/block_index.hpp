@@ -1,7 +1,9 @@
 /// Index of the map's pages: which pages belong to which block of the world.
 #pragma once
 
+#include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "map/block_key.hpp"
@@ -18,20 +20,29 @@ class BlockIndex {
   /// Adds one page to a block: a free page if there is one, else the page at end(). @return number of the page
   std::uint32_t add_page(const BlockKey& block);
 
-  /// Removes a page from its block and makes it free. Does nothing if the page is not the block's.
-  void remove_page(const BlockKey& block, std::uint32_t page);
+  /// Undoes the last add_page(), or after that the one before it. @param end  end() before the first one that will be undone
+  void take_back(const BlockKey& block, std::uint32_t page, std::size_t end);
 
-  /// Raises end() to `end` if it is lower. The pages in between become free; the lowest of them is used first.
-  void skip_to(std::size_t end);
+  /// Removes a page from its block. Does nothing if the page is not the block's.
+  /// @param frame  the page becomes free by release(frame) or later; 0: it is free at once
+  void remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame = 0);
 
-  std::size_t end() const { return end_; }                  ///< one past the last page ever used
-  std::size_t used() const { return end_ - free_.size(); }  ///< pages that belong to a block
-  std::size_t bytes() const;                                ///< host memory of the index, estimated
+  /// Makes the pages free that have been removed in frames up to `frame`.
+  void release(std::uint64_t frame);
+
+  /// An index without blocks, but with the same end(). The lowest free page is used first.
+  /// @param frame  the pages of this index's blocks become free by release(frame); 0: all pages are free at once
+  BlockIndex emptied(std::uint32_t frame) const;
+
+  std::size_t end() const { return end_; }                                    ///< one past the last page ever used
+  std::size_t used() const { return end_ - free_.size() - removed_.size(); }  ///< pages that belong to a block
+  std::size_t bytes() const;                                                  ///< host memory of the index, estimated
   const std::unordered_map<BlockKey, Pages>& blocks() const { return blocks_; }
 
  private:
   std::unordered_map<BlockKey, Pages> blocks_;
-  Pages free_;  ///< add_page() takes the last one
+  Pages free_;                                                    ///< add_page() takes the last one
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> removed_;  ///< frame and page of those that are not free yet
   std::uint32_t end_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontier_surfels/number_text.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -66,8 +67,8 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
                         high = ((box.max().array() + margin) / block_size).floor();
   const Eigen::Vector3d size = high - low + Eigen::Vector3d::Ones();
   if (!(size.prod() < kMaxCells))
-    throw BadFrame("The view's grid would be " + std::to_string(size.maxCoeff() * block_size) + " m large, too much for a range of " +
-                   std::to_string(grid.z_max) + " m; check the intrinsics.");
+    throw BadFrame("The view's grid would be " + fixed_text(size.maxCoeff() * block_size, 1) + " m large, too much for a range of " +
+                   fixed_text(grid.z_max, 1) + " m; check the intrinsics.");
   window_.origin_x = static_cast<int>(low.x());
   window_.origin_y = static_cast<int>(low.y());
   window_.origin_z = static_cast<int>(low.z());

@@ -23,7 +23,7 @@ struct PcdHeader {
   std::uint64_t points = 0;
   bool ascii = false;                ///< otherwise binary
   std::size_t bytes = 0;             ///< of the header itself, its last line included
-  std::optional<std::uint32_t> crc;  ///< of what follows checksum_line in the file, where our own comment gives it
+  std::optional<std::uint32_t> crc;  ///< checksum of everything after the comment that holds it; empty if the file has no such comment
   std::size_t checked_from = 0;      ///< [byte] where that begins
 
   /// Null if there is none of this name.

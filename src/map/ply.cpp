@@ -187,8 +187,12 @@ void write_ply(const std::string& path, const SavedMap& map) {
     const std::vector<std::uint8_t> bytes = pack_view(view);
     append(body, bytes.data(), bytes.size());
   }
-  const Sizes sizes = {checksum(body.data(), body.size()), map.surfels.size(),     map.seen.block_size,
-                       map.seen.points,                    map.seen.blocks.size(), map.views.size()};
+  const Sizes sizes = {checksum(body.data(), body.size()),
+                       map.surfels.size(),
+                       map.seen.block_size,
+                       map.seen.points,
+                       map.seen.blocks.size(),
+                       map.views.size()};
   replace_file(path, header(sizes), body.data(), body.size());
 }
 
@@ -209,8 +213,7 @@ SavedMap read_saved_ply(const std::string& path) {
 
   SavedMap map;
   map.surfels.resize(sizes.surfels);
-  for (std::size_t n = 0; n < map.surfels.size(); ++n)
-    map.surfels[n] = to_surfel(&body[n * sizeof(Record)], static_cast<std::uint32_t>(n));
+  for (std::size_t n = 0; n < map.surfels.size(); ++n) map.surfels[n] = to_surfel(&body[n * sizeof(Record)], static_cast<std::uint32_t>(n));
   check_read(path, map.surfels);
   map.seen = {sizes.block_size, sizes.points, {}};
   Pieces pieces(body, of_surfels, path, sizes);

@@ -16,8 +16,8 @@ namespace {
 constexpr int kPoints = SEEN_BRICK * SEEN_BRICK * SEEN_BRICK;  // of a brick
 constexpr int kWhole = kPoints;                                // stands for all points of a brick without surfels
 
-// Points behind surfels are unseen only if several surfels say so, and not by a hair: a surfel alone is more likely a wrong one, and a wrong
-// unseen point makes all points around it unseen, too.
+// Points behind surfels are unseen only if several surfels say so, and not by a hair: a surfel alone is more likely a wrong one, and a
+// wrong unseen point makes all points around it unseen, too.
 constexpr double kLeastWeight = 0.5;  // sum of the surfels' weights, which are 1 at most
 constexpr double kLeastDepth = 0.2;   // mean depth behind the discs [spacing]
 
@@ -25,7 +25,7 @@ enum : std::uint8_t { kOpen = 0, kSeen = 1, kUnseen = 2 };
 
 /// Points are numbered (z SEEN_BRICK + y) SEEN_BRICK + x.
 struct Brick {
-  BlockKey key;                       ///< counted in bricks from the world's origin
+  BlockKey key;                        ///< counted in bricks from the world's origin
   std::vector<std::uint32_t> surfels;  ///< that reach into it
   std::vector<std::uint8_t> labels;    ///< of its points, or of all together: [kPoints] or [1]
 };
@@ -184,7 +184,8 @@ void Filling::visit_neighbours(const Node& node) {
       }
       const int along = strides[axis == 0 ? 1 : 0], across = strides[axis == 2 ? 1 : 2];
       for (int n = 0; n < SEEN_BRICK * SEEN_BRICK; ++n)
-        reach(step(axis, side), (side < 0 ? last : 0) * stride + n % SEEN_BRICK * along + n / SEEN_BRICK * across, node.label, SEEN_BRICK / 2);
+        reach(step(axis, side), (side < 0 ? last : 0) * stride + n % SEEN_BRICK * along + n / SEEN_BRICK * across, node.label,
+              SEEN_BRICK / 2);
     }
 }
 

@@ -74,8 +74,14 @@ SeenSpace SeenPoints::saved() const {
 }
 
 SeenPoints::SeenPoints(Commands& commands, double block_size)
-    : commands_(commands), block_size_(block_size), slots_(commands), entries_(commands), tables_on_device_(commands), bricks_(commands),
-      gathered_(commands), gathered_list_(commands) {
+    : commands_(commands),
+      block_size_(block_size),
+      slots_(commands),
+      entries_(commands),
+      tables_on_device_(commands),
+      bricks_(commands),
+      gathered_(commands),
+      gathered_list_(commands) {
   clear();
 }
 

@@ -40,12 +40,12 @@ class SeenPoints {
   /// @param block_size  edge of the map's blocks [m]
   SeenPoints(Commands& commands, double block_size);
 
-  /// Chooses the lattice, unless choose_shift() has, or something is remembered: the distance of its points becomes a block's edge divided by a
-  /// power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
+  /// Chooses the lattice, unless choose_shift() has, or something is remembered: the distance of its points becomes a block's edge divided
+  /// by a power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
   void choose_spacing(double spacing);
   void choose_shift(int shift);  ///< chooses the lattice of a saved map until clear(); nothing may be remembered
   static int shift_for_spacing(double block_size, double spacing);
-  double spacing() const;         ///< distance of the lattice's points [m]
+  double spacing() const;               ///< distance of the lattice's points [m]
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
   bool empty() const { return table_of_.empty(); }
 
@@ -60,18 +60,19 @@ class SeenPoints {
 
   /// @name Changes of entries. They reach the device with send_entries().
   /// @{
-  cl_int add_brick(int table, int brick);      ///< a brick of its own, without seen points, for a place that has none. @return its number
+  cl_int add_brick(int table, int brick);  ///< a brick of its own, without seen points, for a place that has none. @return its number
   void set_uniform(int table, int brick, bool seen);  ///< all points of the brick are seen, or none; a brick of its own becomes free
   void send_entries(const char* stage);
   /// @}
 
-  /// @name Whole blocks, for files and for the archive. Their bytes: a state for each brick (SEEN_NONE, SEEN_MIXED, SEEN_ALL), then the words
-  /// of the bricks with SEEN_MIXED.
+  /// @name Whole blocks, for files and for the archive. Their bytes: a state for each brick (SEEN_NONE, SEEN_MIXED, SEEN_ALL), then the
+  /// words of the bricks with SEEN_MIXED.
   /// @{
-  std::vector<BlockKey> blocks_with_points() const;  ///< sorted
+  std::vector<BlockKey> blocks_with_points() const;                                               ///< sorted
   std::vector<std::vector<std::uint8_t>> read_blocks(const std::vector<BlockKey>& blocks) const;  ///< no bytes: no point is seen
 
-  /// Puts blocks with these bytes in place of what is remembered of them. @throws FileError  the bytes are those of another lattice, or damaged
+  /// Puts blocks with these bytes in place of what is remembered of them. @throws FileError  the bytes are those of another lattice, or
+  /// damaged
   void add_blocks(const std::vector<SeenBlock>& blocks);
   void drop_block(const BlockKey& block);
 
@@ -112,13 +113,13 @@ class SeenPoints {
   int shift_ = 2;
   bool fixed_ = false;  ///< by choose_shift()
   std::unordered_map<BlockKey, int> table_of_;
-  std::vector<cl_int> tables_;           ///< the device's tables; the host is their master
-  std::vector<int> full_bricks_;         ///< of each table: number of entries that are SEEN_BRICK_FULL
-  std::vector<int> free_tables_;         ///< of blocks that were dropped; the last one is used next
-  std::vector<cl_int> free_;             ///< bricks that no entry has; the last one is used next
-  std::size_t used_ = 2;                 ///< one past the last brick ever used; the first two stand for uniform bricks
-  std::size_t sent_tables_ = 0;          ///< entries that the device has
-  std::vector<cl_int> changed_places_;   ///< entries of the tables that the device does not have yet
+  std::vector<cl_int> tables_;          ///< the device's tables; the host is their master
+  std::vector<int> full_bricks_;        ///< of each table: number of entries that are SEEN_BRICK_FULL
+  std::vector<int> free_tables_;        ///< of blocks that were dropped; the last one is used next
+  std::vector<cl_int> free_;            ///< bricks that no entry has; the last one is used next
+  std::size_t used_ = 2;                ///< one past the last brick ever used; the first two stand for uniform bricks
+  std::size_t sent_tables_ = 0;         ///< entries that the device has
+  std::vector<cl_int> changed_places_;  ///< entries of the tables that the device does not have yet
   SentArray<cl_int> slots_;
   SentArray<cl_int2> entries_;
   DeviceArray<cl_int> tables_on_device_;

@@ -17,13 +17,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Why the last call failed, as the end of a sentence.
+std::string reason() {
+  if (errno == ENAMETOOLONG) return "a file system takes no name as long as that (most take 255 bytes); give a shorter one.";
+  return std::string(std::strerror(errno)) + ".";
+}
+
 /// A new file that takes the place of `path` at commit(). Without commit() it leaves no trace.
 class Replacement {
  public:
   explicit Replacement(const std::string& path) : path_(path) {
     static std::atomic<unsigned> counter{0};  // several threads may save at once
     do {
-      temporary_ = path + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+      // A name of its own, because the file's may be as long as names can be.
+      const std::string name = ".frontier_surfels-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + ".tmp";
+      temporary_ = (fs::path(path).parent_path() / name).string();
       file_ = std::fopen(temporary_.c_str(), "wbxe");  // x: never into a file that is there already
     } while (file_ == nullptr && errno == EEXIST);
     if (file_ == nullptr) fail();
@@ -47,7 +55,7 @@ class Replacement {
   }
 
  private:
-  [[noreturn]] void fail() const { throw FileError("The map cannot be written to " + path_ + ": " + std::strerror(errno) + "."); }
+  [[noreturn]] void fail() const { throw FileError("The map cannot be written to " + path_ + ": " + reason()); }
 
   std::string path_, temporary_;
   std::FILE* file_ = nullptr;
@@ -58,7 +66,7 @@ bool is_sound(const Surfel& s) {
          (s.label == Label::kFrontier || s.label == Label::kOccupied);
 }
 
-FileError unreadable(const std::string& path) { return FileError("The map " + path + " cannot be read: " + std::strerror(errno) + "."); }
+FileError unreadable(const std::string& path) { return FileError("The map " + path + " cannot be read: " + reason()); }
 
 }  // namespace
 

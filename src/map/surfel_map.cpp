@@ -36,6 +36,7 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       surfels_(commands),
       alive_(commands),
       changed_(commands),
+      reserved_(commands),
       page_block_(commands),
       pages_list_(commands),
       page_cells_list_(commands),
@@ -46,7 +47,15 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       free_before_(commands),
       missing_(commands),
       order_(commands),
-      changes_(commands),
+      kept_pages_(commands),
+      kept_count_(commands),
+      kept_surfel_slots_(commands),
+      kept_frames_(commands),
+      kept_alive_(commands),
+      kept_taken_(commands),
+      kept_slots_(commands),
+      kept_surfels_(commands),
+      changes_{FrameChanges(commands), FrameChanges(commands)},
       empty_(commands),
       changed_slots_(commands),
       gathered_(commands),
@@ -56,15 +65,14 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
 
 /// Makes room for pages. New ones have no bits in `alive` and `changed`, like all pages without surfels.
 void SurfelMap::grow(std::size_t pages) {
+  constexpr std::size_t kMaxPages = (std::size_t{1} << 32) / PAGE_SLOTS;  // slots are numbered with 32 bits
+  if (pages > kMaxPages)
+    throw DeviceError("The map would have more than 4.29 billion surfels, which is the limit; raise decimation, or reset the map.");
   const std::size_t kept = index_.end(), spare = commands_.device().is_cpu ? 1 : kSpare;
-  const auto grow_marks = [&](DeviceArray<cl_ulong>& marks) {
-    const std::size_t before = marks.size();
-    marks.grow(pages, kept, spare);
-    if (marks.size() > before) marks.fill("creation", 0, marks.size() - kept, kept);
-  };
   surfels_.grow(PAGE_SLOTS * pages, PAGE_SLOTS * kept, spare);
-  grow_marks(alive_);
-  grow_marks(changed_);
+  alive_.grow_filled("creation", 0, pages, kept, spare);
+  changed_.grow_filled("creation", 0, pages, kept, spare);
+  if (reserves_ids_) reserved_.grow_filled("creation", 0, pages, kept, spare);
   page_block_.grow(pages, kept, spare);
 }
 
@@ -85,6 +93,7 @@ double SurfelMap::window_reach(const Grid& grid, const Eigen::Isometry3d& T_worl
 void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_camera) {
   const double largest = std::max(largest_radius_, largest_created(grid));
   window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid), {largest, thickness_});
+  begin_undo();
   largest_radius_ = largest;
   listed_cells_.clear();
   for (int cell = 0; cell < window_.cells(); ++cell) {
@@ -120,7 +129,7 @@ void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_ce
   new_ranks_ = std::move(new_ranks);
 }
 
-/// Forgets the window's pages. A frame that failed halfway cannot be finished later, because its pages may change their blocks.
+/// Forgets the window's pages: they may change their blocks.
 void SurfelMap::close_window() {
   window_pages_.clear();
   page_cells_.clear();
@@ -156,14 +165,14 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   order_.resize(count);
   if (commands_.device().prefers_one_item && count <= kMaxSortedAlone)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
-                  alive_(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
+                  taken(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else
     sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
   add_pages(missing_.read(cell_count));
 
   commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
-                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), surfels_());
+                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), taken(), surfels_());
   size_ += count;
 }
 
@@ -175,7 +184,7 @@ void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cell
   commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), free_before_());
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, taken(), free_before_());
   lists_.prefix_sums(stage, free_before_, pages);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
                 missing_());
@@ -190,7 +199,7 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   for (std::size_t cell = 0; cell < missing.size(); ++cell) {
     if (missing[cell] > 0) listed_cells_[cell] = true;
     for (cl_uint rank = 0; rank < missing[cell]; ++rank) {
-      pages.push_back(index_.add_page(window_.block(static_cast<int>(cell))));
+      pages.push_back(add_page(window_.block(static_cast<int>(cell))));
       page_cells.push_back(static_cast<cl_uint>(cell));
       ranks.push_back(rank);
     }
@@ -198,27 +207,26 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
   if (!ranks.empty()) set_window(std::move(pages), std::move(page_cells), std::move(ranks));
 }
 
-std::vector<BlockKey> SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
+void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
+  FrameChanges& found = changes_[1 - last_];
   const auto count = static_cast<cl_uint>(window_pages());
-  changes_.resize(count + 1);
+  found.count = count;
+  found.pages.resize(count + 1);
+  found.slots.resize(count + 1);
   empty_.resize(count + 1);
-  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changes_(),
-                empty_());
+  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), found.pages(),
+                found.slots(), empty_());
   const std::vector<cl_uchar> empty = empty_.read(count);
-  std::vector<BlockKey> shrunk;
-  for (cl_uint n = 0; n < count; ++n) {
-    if (!empty[n]) continue;
-    const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
-    index_.remove_page(block, window_pages_[n]);
-    shrunk.push_back(block);
-  }
-  return shrunk;
+  empty_pages_.clear();
+  for (cl_uint n = 0; n < count; ++n)
+    if (empty[n]) empty_pages_.push_back(n);
 }
 
 Changes SurfelMap::last_changes() {
   const char* stage = "changes";
-  const std::uint32_t count = lists_.list_bits(stage, changes_, window_pages(), changed_slots_);
-  commands_.run(stage, "to_slots", count, kGroup, pages_list_(), changed_slots_(), count);
+  const FrameChanges& last = changes_[last_];
+  const std::uint32_t count = lists_.list_bits(stage, last.slots, last.count, changed_slots_);
+  commands_.run(stage, "to_slots", count, kGroup, last.pages(), changed_slots_(), count);
   gathered_.resize(count);
   gathered_blocks_.resize(count);
   commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, alive_(), page_block_(), surfels_(), gathered_(),
@@ -272,7 +280,7 @@ std::vector<Surfel> SurfelMap::download() const {
   return surfels;
 }
 
-Changes SurfelMap::changes(std::uint64_t since) const {
+Changes SurfelMap::changes(std::uint64_t since, bool given_again) const {
   const auto blocks = page_block_.read(index_.end());
   std::vector<Page> pages;
   for (Page page = 0; page < blocks.size(); ++page)
@@ -280,18 +288,34 @@ Changes SurfelMap::changes(std::uint64_t since) const {
   Changes changes;
   visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
     for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
-    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+    for_each_bit(given_again ? ~cl_ulong{0} : ~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
   });
   return changes;
 }
 
-std::size_t SurfelMap::allocated_bytes() const { return surfels_.bytes() + alive_.bytes() + changed_.bytes() + page_block_.bytes(); }
+void SurfelMap::reserve_ids(std::optional<std::uint64_t> told) {
+  if (!told) {
+    reserves_ids_ = false;
+    index_.release(~std::uint64_t{0});
+    return;
+  }
+  const cl_uint frame = reserves_ids_ ? static_cast<cl_uint>(*told) : ~cl_uint{0};  // at first, all slots that are not alive are free
+  if (!reserves_ids_) reserved_.allocate(alive_.size());
+  const auto pages = static_cast<cl_uint>(index_.end());
+  commands_.run("changes", "reserve_slots", pages, kGroup, pages, page_block_(), alive_(), frame, reserved_());
+  reserves_ids_ = true;
+  index_.release(*told);
+}
+
+std::size_t SurfelMap::allocated_bytes() const {
+  return surfels_.bytes() + alive_.bytes() + changed_.bytes() + reserved_.bytes() + page_block_.bytes();
+}
 
 std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes(); }
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;
-  // Without `alive` and `changed`: these are filled with zeros, hence touched.
+  // Without `alive`, `changed` and `reserved`: these are filled with zeros, hence touched.
   constexpr std::size_t kPage = PAGE_SLOTS * sizeof(cl_uint4) + sizeof(cl_int4);
   return surfels_.bytes() + page_block_.bytes() - kPage * index_.end();
 }

@@ -1,10 +1,13 @@
 /// The map in device buffers: the world has blocks, a block has pages, a page has PAGE_SLOTS slots for surfels. A surfel's slot is its id.
+/// While someone follows the changes, slots of removed surfels are reserved until these readers know of the removal.
 /// kernels/common/surfels.cl describes the buffers.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
@@ -39,19 +42,35 @@ class SurfelMap {
   /// Lists the pages of all blocks within a distance [m] of the window. @return number of pages
   std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
 
+  /// Keeps what the frame may overwrite, so that roll_back() can undo the frame: surfels that are marked as changed, and those in `freed`.
+  /// @param freed  surfels that are going to leave the map, a word for each page that the window had when it was opened
+  /// @param count  number of surfels in `freed`
+  void back_up(const char* stage, const DeviceArray<cl_ulong>& freed, std::size_t count);
+
   /// Makes room for `additional` more surfels in this window.
   void reserve(std::size_t additional);
 
   /// Puts surfels into the map. @param cells  each surfel's cell of the window
   void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count);
 
+  /// Counts surfels that a kernel has marked as changed; back_up() makes room for them.
+  void marked(std::size_t count) { undo_.most_kept += count; }
+
   /// Subtracts surfels that a kernel has removed from size().
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Marks the pages that changed as changed in this frame, and frees the empty ones. @return block of each freed page
-  std::vector<BlockKey> finish_frame(const char* stage, std::uint32_t frame);
+  /// Marks the pages that changed as changed in this frame, and finds those that it has left empty. The frame can still fail.
+  void finish_frame(const char* stage, std::uint32_t frame);
 
-  /// Changes of the last frame; available until the next one begins.
+  /// Ends the frame for good, after finish_frame(): frees the empty pages. @return block of each freed page
+  std::vector<BlockKey> commit(std::uint32_t frame);
+
+  /// Undoes what a failed frame, or a failed add_block() or drop_block(), has done since the last commit(). Nothing else can be done with
+  /// the map before this has succeeded. Does nothing if nothing has failed.
+  /// @throws DeviceError  the device fails again (call it again later), or it has failed in replace() and the map is lost
+  void roll_back();
+
+  /// Changes of the last frame.
   Changes last_changes();
   /// @}
 
@@ -59,9 +78,15 @@ class SurfelMap {
   std::vector<Surfel> download() const;
 
   /// Content of the pages that changed after frame `since`: all their surfels as updated, all their empty slots as removed.
-  Changes changes(std::uint64_t since) const;
+  /// @param given_again  ids may have been given again after `since`: all slots of these pages are told as removed
+  Changes changes(std::uint64_t since, bool given_again = false) const;
 
-  /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. @return slot of each surfel
+  /// From now on, no id is given again that a surfel has lost after frame `told`. To be called between frames. Without a number, ids are
+  /// given again at once, as at first.
+  void reserve_ids(std::optional<std::uint64_t> told);
+
+  /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. If the device fails meanwhile, the map
+  /// is lost until it is replaced again. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
   /// @name Whole blocks, for the archive. Called between frames; adding or dropping a block closes the last frame's window.
@@ -88,7 +113,31 @@ class SurfelMap {
  private:
   using Page = std::uint32_t;
   using PageVisitor = std::function<void(Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* surfels)>;
+
+  /// What roll_back() needs.
+  struct Undo {
+    bool open = false;                                 ///< something may have to be undone
+    bool lost = false;                                 ///< replace() has begun
+    double largest_radius = 0;                         ///< [m]
+    std::size_t size = 0, end = 0;                     ///< of the map, of the index
+    std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them
+    std::vector<std::pair<Page, cl_ulong>> dropped;    ///< pages of a dropped block, with their words of `alive`
+    std::size_t kept_pages = 0;                        ///< pages of which back_up() has kept something
+    std::size_t most_kept = 0, room = 0;               ///< surfels that back_up() may have to keep, and for which it has made room
+  };
+
+  /// Changes of a frame.
+  struct FrameChanges {
+    explicit FrameChanges(Commands& commands) : pages(commands), slots(commands) {}
+    DeviceArray<cl_uint> pages;
+    DeviceArray<cl_ulong> slots;  ///< a word for each of the pages
+    std::size_t count = 0;        ///< of pages
+  };
+
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
+  void begin_undo();
+  void restore();
+  Page add_page(const BlockKey& block);
   void grow(std::size_t pages);
   double window_margin(const Grid& grid) const;
   void list_window();
@@ -96,6 +145,8 @@ class SurfelMap {
   void close_window();
   void add_pages(const std::vector<cl_uint>& missing);
   std::size_t allocated_bytes() const;
+  const cl::Buffer& taken() const { return reserves_ids_ ? reserved_() : alive_(); }      ///< slots that no new surfel may take
+  std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
   void sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
 
@@ -105,11 +156,13 @@ class SurfelMap {
   double largest_radius_;    ///< no surfel of the map is larger [m]
   const double thickness_;   ///< [voxel]
   std::size_t size_ = 0;
+  bool reserves_ids_ = false;
   BlockIndex index_;
 
   // Indexed by slot or page
   DeviceArray<cl_uint4> surfels_;
   DeviceArray<cl_ulong> alive_, changed_;
+  DeviceArray<cl_ulong> reserved_;  ///< alive ones, and those whose removal has not been told. Only with reserves_ids_
   DeviceArray<cl_int4> page_block_;
 
   // This frame's window: its pages, sorted by cell
@@ -124,9 +177,18 @@ class SurfelMap {
   // Insertion
   DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
 
+  // What a failed frame has overwritten
+  Undo undo_;
+  DeviceArray<cl_uint> kept_pages_, kept_count_, kept_surfel_slots_;
+  DeviceArray<cl_int> kept_frames_;
+  DeviceArray<cl_ulong> kept_alive_, kept_taken_, kept_slots_;
+  DeviceArray<cl_uint4> kept_surfels_;
+
   // Changes
-  DeviceArray<cl_ulong> changes_;
+  FrameChanges changes_[2];
+  int last_ = 0;  ///< which of changes_ are those of the last frame; the others are for the frame at hand
   DeviceArray<cl_uchar> empty_;
+  std::vector<std::size_t> empty_pages_;  ///< indices in window_pages_
   DeviceArray<cl_uint> changed_slots_;
   DeviceArray<cl_uint4> gathered_;
   DeviceArray<cl_int4> gathered_blocks_;

@@ -15,22 +15,23 @@ constexpr double kLargestRadius = 4;  // [block]; the window covers the reach of
 
 /// Surfels packed into new pages, as the map's buffers hold them.
 struct PackedMap {
-  BlockIndex index;
-  std::vector<cl_uint4> surfels;  ///< [PAGE_SLOTS * pages]
+  BlockIndex index;               ///< a page that it gives for the first time is free
+  std::uint32_t frame;            ///< all pages count as changed in it, so that changes() reports the former surfels of those left empty
+  std::vector<cl_uint4> surfels;  ///< [PAGE_SLOTS * pages] up to the last page that has any
   std::vector<cl_ulong> alive;    ///< [pages]
   std::vector<cl_int4> page_block;
   double largest_radius = 0;  ///< [m]
 
   /// @return slot of the surfel
-  std::uint32_t add(const Surfel& surfel, double block_size, std::uint32_t frame) {
+  std::uint32_t add(const Surfel& surfel, double block_size) {
     const BlockKey block = block_of(surfel.position, block_size);
     const BlockIndex::Pages* pages = index.find(block);
     if (pages == nullptr || alive[pages->back()] == ~cl_ulong{0}) {
-      index.add_page(block);
+      const std::uint32_t page = index.add_page(block);
       pages = index.find(block);
-      alive.push_back(0);
-      surfels.resize(PAGE_SLOTS * alive.size());
-      page_block.push_back({{block.x, block.y, block.z, static_cast<cl_int>(frame)}});
+      if (page >= alive.size()) add_empty_pages(page + 1);
+      surfels.resize(PAGE_SLOTS * std::max<std::size_t>(page + 1, surfels.size() / PAGE_SLOTS));
+      page_block[page] = {{block.x, block.y, block.z, static_cast<cl_int>(frame)}};
     }
     const std::uint32_t page = pages->back(), n = static_cast<std::uint32_t>(__builtin_ctzll(~alive[page])), slot = PAGE_SLOTS * page + n;
     alive[page] |= cl_ulong{1} << n;
@@ -40,31 +41,36 @@ struct PackedMap {
     largest_radius = std::max<double>(largest_radius, kept.radius);
     return slot;
   }
+
+  void add_empty_pages(std::size_t end) {
+    alive.resize(end, 0);
+    page_block.resize(end, {{0, 0, 0, static_cast<cl_int>(frame)}});
+  }
 };
 
 }  // namespace
 
 std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
-  PackedMap packed;
+  PackedMap packed{index_.emptied(removal(frame)), frame, {}, {}, {}};
   std::vector<std::uint32_t> slots;
   for (const Surfel& surfel : surfels) {
     if (!(surfel.position.array().abs() < kFarthest).all())  // true for NaN as well
       throw Error("A surfel's position is not finite or more than 1000 km from the world's origin: give positions in metres.");
-    slots.push_back(packed.add(surfel, block_size_, frame));
+    slots.push_back(packed.add(surfel, block_size_));
   }
-  grow(std::max(packed.alive.size(), index_.end()));
+  packed.add_empty_pages(packed.index.end());
+  grow(packed.index.end());
   close_window();
-  // The pages of the old map count as changed, so that changes() reports their surfels as removed.
-  const std::size_t before = index_.end();
-  packed.index.skip_to(before);
-  for (; packed.alive.size() < before; packed.page_block.push_back({{0, 0, 0, static_cast<cl_int>(frame)}})) packed.alive.push_back(0);
+  undo_.lost = true;
   surfels_.write(packed.surfels);
   alive_.write(packed.alive);
+  if (reserves_ids_) reserved_.write(packed.alive);
   changed_.write(std::vector<cl_ulong>(packed.alive.size(), 0));  // a failed frame may have left bits
   page_block_.write(packed.page_block);
   index_ = std::move(packed.index);
   size_ = surfels.size();
   largest_radius_ = packed.largest_radius;
+  undo_ = {};
   return slots;
 }
 
@@ -107,29 +113,41 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
   const std::size_t pages = (surfels.size() + PAGE_SLOTS - 1) / PAGE_SLOTS;
   grow(index_.end() + pages);
   close_window();
+  begin_undo();
   for (std::size_t n = 0; n < pages; ++n) {
     const auto begin = surfels.begin() + PAGE_SLOTS * n;
     const std::vector<cl_uint4> some(begin, std::min(begin + PAGE_SLOTS, surfels.end()));
-    const Page page = index_.add_page(block);
+    const Page page = add_page(block);
     surfels_.write(some, PAGE_SLOTS * page);
-    alive_.write({some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1}, page);
+    const cl_ulong alive = some.size() == PAGE_SLOTS ? ~cl_ulong{0} : (cl_ulong{1} << some.size()) - 1;
+    alive_.write({alive}, page);
+    if (reserves_ids_) reserved_.write({alive}, page);
     changed_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
   }
   size_ += surfels.size();
   for (const cl_uint4& packed : surfels) largest_radius_ = std::max<double>(largest_radius_, unpack(packed, block, block_size_).radius);
+  undo_ = {};
 }
 
 void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   const BlockIndex::Pages* found = index_.find(block);
   if (found == nullptr) return;
+  const BlockIndex::Pages pages = *found;
   close_window();
-  for (const Page page : BlockIndex::Pages(*found)) {
-    size_ -= static_cast<std::size_t>(__builtin_popcountll(alive_.read_one(page)));
+  begin_undo();
+  std::size_t dropped = 0;
+  for (const Page page : pages) {
+    undo_.dropped.emplace_back(page, alive_.read_one(page));
+    dropped += static_cast<std::size_t>(__builtin_popcountll(undo_.dropped.back().second));
+  }
+  for (const Page page : pages) {
     alive_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
-    index_.remove_page(block, page);
   }
+  for (const Page page : pages) index_.remove_page(block, page, removal(frame));
+  size_ -= dropped;
+  undo_ = {};
 }
 
 }  // namespace frontier_surfels

@@ -11,7 +11,8 @@ Eigen::Vector2d slopes(double f, double c, int size) { return {(-0.5 - c) / f, (
 }  // namespace
 
 ViewBlocks blocks_of_view(const Intrinsics& intrinsics, const Eigen::Isometry3d& T_world_camera, double deepest, double block_size) {
-  const Eigen::Vector2d i = slopes(intrinsics.fx, intrinsics.cx, intrinsics.width), j = slopes(intrinsics.fy, intrinsics.cy, intrinsics.height);
+  const Eigen::Vector2d i = slopes(intrinsics.fx, intrinsics.cx, intrinsics.width),
+                        j = slopes(intrinsics.fy, intrinsics.cy, intrinsics.height);
   Eigen::AlignedBox3d box(T_world_camera.translation());
   for (const double x : {i[0], i[1]})
     for (const double y : {j[0], j[1]}) box.extend(T_world_camera * (deepest * Eigen::Vector3d(x, y, 1)));

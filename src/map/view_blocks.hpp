@@ -11,7 +11,7 @@
 namespace frontier_surfels {
 
 struct ViewBlocks {
-  Window window = {};             ///< that has them all
+  Window window = {};                ///< that has them all
   Eigen::Isometry3d T_camera_local;  ///< local: the window's frame
   std::vector<BlockKey> blocks;
 };

@@ -9,8 +9,8 @@
 
 namespace frontier_surfels {
 
-/// Numbers of a view (double), in the order of its bytes: T_world_camera column by column without the last row, the intrinsics, and the step of
-/// the depths. Width and height (int32), the number of depths (uint32) and the depths (uint16) follow.
+/// Numbers of a view (double), in the order of its bytes: T_world_camera column by column without the last row, the intrinsics, and the
+/// step of the depths. Width and height (int32), the number of depths (uint32) and the depths (uint16) follow.
 constexpr const char* kViewNumbers[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy",        "zz",
                                         "tx", "ty", "tz", "fx", "fy", "cx", "cy", "depth_step"};
 

@@ -83,6 +83,7 @@ Commands::~Commands() {
 }
 
 void Commands::finish() {
+  FaultInjection::step("clFinish");
   queue_.finish();
   kept_.clear();
 }
@@ -108,10 +109,9 @@ cl::Buffer Commands::allocate(std::size_t bytes) {
   if (bytes > max_buffer_bytes_)
     throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
                       std::to_string(max_buffer_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
-  cl::Buffer buffer = device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
-                                                               : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
-  allocated_bytes_ += bytes;
-  return buffer;
+  FaultInjection::step("clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
+  return device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
+                                                  : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
 }
 
 }  // namespace frontier_surfels

@@ -10,6 +10,7 @@
 
 #include "frontier_surfels/types.hpp"
 #include "opencl/device.hpp"
+#include "opencl/fault_injection.hpp"
 
 namespace frontier_surfels {
 
@@ -27,7 +28,12 @@ class Commands {
   const Device& device() const { return device_; }
   std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
   std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
-  cl::CommandQueue& queue() { return queue_; }
+
+  /// The queue, for one command.
+  cl::CommandQueue& queue() {
+    FaultInjection::step("clEnqueue");
+    return queue_;
+  }
 
   /// Launches a kernel with at least `items` work items in groups of `group`. Its device time counts towards `stage`.
   template <typename... Args>
@@ -39,7 +45,7 @@ class Commands {
   template <typename... Args>
   void run(const char* stage, const char* kernel, const cl::NDRange& global, const cl::NDRange& local, const Args&... args) {
     cl::KernelFunctor<Args...> functor(kernels_.at(kernel));
-    note(stage, functor(cl::EnqueueArgs(queue_, global, local), args...));
+    note(stage, functor(cl::EnqueueArgs(queue(), global, local), args...));
   }
 
   void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }  ///< counts its time towards `stage`
@@ -55,9 +61,9 @@ class Commands {
   void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
   std::size_t max_buffer_bytes() const { return max_buffer_bytes_; }  ///< limit of the device for one buffer
-  cl::Buffer allocate(std::size_t bytes);
+  cl::Buffer allocate(std::size_t bytes);                             ///< the caller counts it
 
-  /// Count memory that the caller has allocated without allocate(), or has released.
+  /// Count memory that the caller has allocated or released.
   void allocated(std::size_t bytes) { allocated_bytes_ += bytes; }
   void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
   std::size_t allocated_bytes() const { return allocated_bytes_; }
@@ -91,12 +97,17 @@ class DeviceArray {
   /// Makes room for `size` elements and size / spare more. Keeps the first `kept` elements.
   void grow(std::size_t size, std::size_t kept, std::size_t spare = 4) {
     if (size <= capacity_) return;
-    const std::size_t larger = std::max(size, std::min(size + size / spare, commands_->max_buffer_bytes() / sizeof(T)));
-    const cl::Buffer bigger = commands_->allocate(larger * sizeof(T));
-    if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
-    commands_->release(capacity_ * sizeof(T));
-    buffer_ = bigger;
-    capacity_ = larger;
+    const std::size_t larger = with_spare(size, spare);
+    replace(enlarged(larger, kept), larger);
+  }
+
+  /// As grow(), and fills a larger buffer with `value` behind the first `kept` elements.
+  void grow_filled(const char* stage, T value, std::size_t size, std::size_t kept, std::size_t spare) {
+    if (size <= capacity_) return;
+    const std::size_t larger = with_spare(size, spare);
+    const cl::Buffer bigger = enlarged(larger, kept);
+    fill(stage, bigger, value, larger - kept, kept);
+    replace(bigger, larger);  // now nothing can fail any more
   }
 
   /// Replaces rows of `old_width` elements by `rows` rows of `width` elements. The first `kept` rows keep their contents.
@@ -105,9 +116,7 @@ class DeviceArray {
     if (kept > 0 && old_width > 0)
       commands_->queue().enqueueCopyBufferRect(buffer_, bigger, {0, 0, 0}, {0, 0, 0}, {old_width * sizeof(T), kept, 1},
                                                old_width * sizeof(T), 0, width * sizeof(T), 0);
-    commands_->release(bytes());
-    buffer_ = bigger;
-    capacity_ = rows * width;
+    replace(bigger, rows * width);
   }
 
   /// Writes values from element `offset` on, growing if needed. Elements before `offset` stay.
@@ -134,17 +143,36 @@ class DeviceArray {
 
   T read_one(std::size_t index) const { return read(1, index).front(); }
 
-  void fill(const char* stage, T value, std::size_t size, std::size_t offset = 0) {
-    cl::Event event;
-    commands_->queue().enqueueFillBuffer(buffer_, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
-    commands_->note(stage, event);
-  }
+  void fill(const char* stage, T value, std::size_t size, std::size_t offset = 0) { fill(stage, buffer_, value, size, offset); }
 
   const cl::Buffer& operator()() const { return buffer_; }
   std::size_t size() const { return capacity_; }
   std::size_t bytes() const { return capacity_ * sizeof(T); }
 
  private:
+  std::size_t with_spare(std::size_t size, std::size_t spare) const {
+    return std::max(size, std::min(size + size / spare, commands_->max_buffer_bytes() / sizeof(T)));
+  }
+
+  cl::Buffer enlarged(std::size_t size, std::size_t kept) const {
+    const cl::Buffer bigger = commands_->allocate(size * sizeof(T));
+    if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
+    return bigger;
+  }
+
+  void replace(const cl::Buffer& buffer, std::size_t size) {
+    commands_->release(bytes());
+    buffer_ = buffer;
+    capacity_ = size;
+    commands_->allocated(bytes());
+  }
+
+  void fill(const char* stage, const cl::Buffer& buffer, T value, std::size_t size, std::size_t offset) {
+    cl::Event event;
+    commands_->queue().enqueueFillBuffer(buffer, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
+    commands_->note(stage, event);
+  }
+
   Commands* commands_;
   cl::Buffer buffer_;
   std::size_t capacity_ = 0;
@@ -166,6 +194,7 @@ class SentArray {
     auto shared = std::make_shared<std::vector<T>>(std::move(values));
     commands_->keep(shared);
     commands_->keep(shared_);  // running kernels may still read the values sent before
+    FaultInjection::step("clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
     buffer_ = cl::Buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, shared->size() * sizeof(T), shared->data());
     commands_->release(shared_bytes());
     shared_ = std::move(shared);

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <sstream>
+
+#include "opencl/kernel_cache.hpp"
 
 namespace frontier_surfels {
 namespace {
+
+constexpr const char* kPocl = "Portable Computing Language";  // name of its platform
 
 struct Candidate {
   std::string platform;
@@ -49,18 +52,19 @@ std::vector<Candidate> all_devices() {
 }
 
 std::string describe(const Candidate& candidate) {
-  std::ostringstream text;
-  text << candidate.platform << ": " << candidate.device.getInfo<CL_DEVICE_NAME>() << " ("
-       << type_name(candidate.device.getInfo<CL_DEVICE_TYPE>()) << ", " << candidate.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()
-       << " compute units)";
-  return text.str();
+  return candidate.platform + ": " + candidate.device.getInfo<CL_DEVICE_NAME>() + " (" +
+         type_name(candidate.device.getInfo<CL_DEVICE_TYPE>()) + ", " +
+         std::to_string(candidate.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()) + " compute units)";
 }
 
 std::string listing(const std::vector<Candidate>& candidates) {
-  if (candidates.empty()) return " There is no OpenCL device at all: install a driver, or pocl-opencl-icd to use the CPU.";
+  const bool has_pocl = std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.platform == kPocl; });
+  const std::string fault = has_pocl ? "" : kernel_cache_fault(kernel_cache_folder());  // without the folder, PoCL has no devices
+  if (candidates.empty())
+    return " " + (fault.empty() ? "There is no OpenCL device at all: install a driver, or pocl-opencl-icd to use the CPU." : fault);
   std::string text = " Available devices:";
   for (const auto& candidate : candidates) text += "\n  " + describe(candidate);
-  return text;
+  return fault.empty() ? text : text + "\n" + fault;
 }
 
 /// A part of the device with `threads` compute units; the whole device if `threads` is 0 or it has no more.
@@ -105,6 +109,8 @@ Device choose_device(const Config& config) {
     if (!(candidate.device.getInfo<CL_DEVICE_TYPE>() & type_of(config.device_type))) continue;
     if (fitting++ != config.device_index) continue;
     try {
+      if (candidate.platform == kPocl)
+        if (const std::string fault = kernel_cache_fault(kernel_cache_folder()); !fault.empty()) throw DeviceError(fault);
       check_abilities(candidate.device);
       Device chosen;
       chosen.device = limit_threads(candidate.device, config.threads);
@@ -112,7 +118,7 @@ Device choose_device(const Config& config) {
       chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
       chosen.is_cpu = chosen.device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU;
       chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_cpu ? 16 : 1;
-      chosen.prefers_one_item = chosen.is_cpu && candidate.platform == "Portable Computing Language";
+      chosen.prefers_one_item = chosen.is_cpu && candidate.platform == kPocl;
       chosen.description = describe({candidate.platform, chosen.device});
       return chosen;
     } catch (const cl::Error& error) {

@@ -1,5 +1,7 @@
 #include "opencl/lists.hpp"
 
+#include <string>
+
 #include "common/shared.h"
 
 namespace frontier_surfels {
@@ -23,7 +25,11 @@ Lists::Lists(Commands& commands)
 std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count) {
   if (count == 0) return 0;
   prefix_sums(stage, values, count);
-  return values.read_one(count);
+  const std::uint32_t total = values.read_one(count);
+  if (total > kMaxTotal)
+    throw BadFrame(std::string("The stage ") + stage + " would make a list of more than " + std::to_string(kMaxTotal) +
+                   " entries for this frame, because its voxels are too small for the surfels of the map; raise decimation.");
+  return total;
 }
 
 void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {

@@ -9,6 +9,8 @@ namespace frontier_surfels {
 
 class Lists {
  public:
+  static constexpr std::uint32_t kMaxTotal = 0xfffffffeU;
+
   explicit Lists(Commands& commands);
 
   /// Replaces each value by the sum of all values before it. @param values  `count` values, and room for one more: the total
@@ -17,6 +19,7 @@ class Lists {
   }
 
   /// As prefix_sums(), and reads the total. @return the total
+  /// @throws BadFrame  the total is more than kMaxTotal
   std::uint32_t scan(const char* stage, DeviceArray<cl_uint>& values, std::size_t count);
 
   /// Lists the set bits of `count` words, ascending, each as 64 * word + bit. @return number of set bits

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "recordings/bag_check.hpp"
+
 namespace frontier_surfels::replay {
 
 using messages::kColorTolerance;
@@ -33,9 +35,10 @@ ImageWindow::ImageWindow(const rosbag::Bag& bag, const std::string& topic)
 ImageMessage ImageWindow::nearest(const ros::Time& stamp) {
   const auto offset = [&](const ImageMessage& image) { return messages::seconds(stamp, image.header().stamp); };
   while (next_ != view_.end() && (window_.empty() || offset(window_.back()) < kColorTolerance)) {
-    const ImageMessage image = to_image_message(*next_);
+    const rosbag::MessageInstance message = *next_;
     ++next_;
-    if (image) window_.push_back(image);
+    const ImageMessage image = to_image_message(message);
+    if (image && is_believed(image.header().stamp)) window_.push_back(image);
     while (!window_.empty() && offset(window_.front()) < -kColorTolerance) window_.pop_front();
   }
   while (!window_.empty() && offset(window_.front()) < -kColorTolerance) window_.pop_front();
@@ -57,7 +60,9 @@ BagSource::BagSource(const std::string& path, const SourceOptions& options) {
     choose_world(options.world_frame);
     next_depth_ = std::next(depth_view_->begin(), static_cast<std::ptrdiff_t>(selection_.first));
     if (!topics_.color.empty()) color_images_ = std::make_unique<ImageWindow>(bag_, topics_.color);
-  } catch (const ros::Exception& error) {
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {  // of rosbag, and std::bad_alloc because of damaged sizes
     throw Error(path + " is damaged (" + error.what() + "): repair it with `rosbag reindex`, or record it again.");
   }
   notes_.push_back("Depth is read from " + topics_.depth + ", the camera from " + topics_.info + ", colour from " +
@@ -66,6 +71,7 @@ BagSource::BagSource(const std::string& path, const SourceOptions& options) {
 
 void BagSource::open(const std::string& path) {
   check_is_bag(path);
+  check_bag(path);
   try {
     bag_.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
@@ -79,14 +85,15 @@ void BagSource::read_transforms_and_cameras() {
   rosbag::View view(bag_, [this](const rosbag::ConnectionInfo* connection) {
     return is_topic(*connection, "tf") || is_topic(*connection, "tf_static") || connection->topic == topics_.info;
   });
+  std::size_t unreadable = 0;
   for (const rosbag::MessageInstance& message : view) {
-    if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) {
-      transforms_.add(*transforms, strip_slash(message.getTopic()) == "tf_static");
-    } else if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
-      cameras_.emplace_back(info->header.stamp, *info);
-      cameras_.back().second.header = std_msgs::Header();  // so that only the cameras themselves are compared below
+    try {
+      read_transforms_or_camera(message);
+    } catch (const std::exception&) {  // of rosbag, and std::bad_alloc because of damaged sizes
+      ++unreadable;
     }
   }
+  if (unreadable > 0) notes_.push_back(std::to_string(unreadable) + " damaged messages with transforms or cameras are left out.");
   if (cameras_.empty())
     throw Error(bag_.getFileName() + " has no message on " + topics_.info +
                 ", so that the camera's intrinsics are unknown: choose another topic with --info-topic.");
@@ -95,8 +102,18 @@ void BagSource::read_transforms_and_cameras() {
   std::stable_sort(cameras_.begin(), cameras_.end(), by_stamp);
   cameras_.erase(std::unique(cameras_.begin(), cameras_.end(), same_camera), cameras_.end());
   if (transforms_.damaged() > 0) {
-    notes_.push_back(std::to_string(transforms_.damaged()) +
-                     " transforms of the bag are left out, because they are not finite, no rotations, or without names.");
+    notes_.push_back(
+        std::to_string(transforms_.damaged()) +
+        " transforms of the bag are left out, because they are not finite, no rotations, without names, or stamped later than in 2038.");
+  }
+}
+
+void BagSource::read_transforms_or_camera(const rosbag::MessageInstance& message) {
+  if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) {
+    transforms_.add(*transforms, strip_slash(message.getTopic()) == "tf_static");
+  } else if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
+    cameras_.emplace_back(info->header.stamp, *info);
+    cameras_.back().second.header = std_msgs::Header();  // so that only the cameras themselves are compared
   }
 }
 
@@ -126,7 +143,7 @@ std::optional<RecordedFrame> BagSource::next() {
       return read(message);
     } catch (const BadFrame& fault) {
       skipped_.push_back(frame + fault.what() + ".");
-    } catch (const ros::Exception& fault) {
+    } catch (const std::exception& fault) {  // of rosbag, and std::bad_alloc because of damaged sizes
       skipped_.push_back(frame + "the bag is damaged there (" + fault.what() + ").");
     }
   }
@@ -167,10 +184,15 @@ cv::Mat BagSource::color_at(const ros::Time& stamp, const cv::Size& depth_size) 
     const messages::Pixels<ColorImage> color = messages::color_pixels(image);
     if (cv::Size(color.view.width, color.view.height) == depth_size) return messages::copy(color.view);
     note_once("Some images on " + topics_.color + " have another size than the depth image" + without);
-  } catch (const std::runtime_error& fault) {  // BadFrame, or rosbag's
+  } catch (const std::exception& fault) {  // BadFrame, rosbag's, or std::bad_alloc because of damaged sizes
     note_once("Some images on " + topics_.color + " cannot be read (" + fault.what() + ")" + without);
   }
   return {};
+}
+
+std::string BagSource::if_still() const {
+  return "record the transform that moves on /tf, or choose another frame with --world-frame; the bag's transforms are: " +
+         transforms_.frames();
 }
 
 void BagSource::note_once(const std::string& sentence) {

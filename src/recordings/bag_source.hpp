@@ -41,6 +41,8 @@ class BagSource : public FrameSource {
   std::optional<RecordedFrame> next() override;
   const std::vector<std::string>& skipped() const override { return skipped_; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::string world_frame() const override { return world_; }
+  std::string if_still() const override;
 
   const rosbag::Bag& bag() const { return bag_; }
   const BagTopics& topics() const { return topics_; }
@@ -51,6 +53,7 @@ class BagSource : public FrameSource {
  private:
   void open(const std::string& path);
   void read_transforms_and_cameras();
+  void read_transforms_or_camera(const rosbag::MessageInstance& message);
   void choose_world(const std::string& wanted);
   RecordedFrame read(const rosbag::MessageInstance& message);
   Intrinsics intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const;

@@ -33,11 +33,12 @@ class TransformStream {
   /// @param topic  tf or tf_static, with or without a slash
   TransformStream(const rosbag::Bag& bag, const std::string& topic);
 
-  /// All transforms up to this time of the bag, except those taken before.
+  /// All transforms up to this time of the bag, except those taken before, and those of tf with stamps that BagTransforms does not believe.
   tf2_msgs::TFMessage take(const ros::Time& until);
 
  private:
   BagStream messages_;
+  bool is_static_;
 };
 
 /// The cameras of frames, in order of the frames.

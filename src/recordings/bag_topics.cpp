@@ -52,13 +52,14 @@ cv::Size size_of(const View& image) {
   return cv::Size(image.width, image.height);
 }
 
-/// What an image message shows; empty if it cannot be used.
-std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& message) {
+/// What an image message shows; empty if it cannot be used. @param fault  set to the reason why it is no depth image
+std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& message, std::string& fault) {
   if (!message) return std::nullopt;
   const bool compressed = static_cast<bool>(message.compressed);
   try {
     return ImageTopic{name, compressed, true, size_of(messages::depth_pixels(message).view)};
-  } catch (const BadFrame&) {  // no depth image, but perhaps a colour image
+  } catch (const BadFrame& bad) {  // no depth image, but perhaps a colour image
+    fault = bad.what();
   }
   try {
     return ImageTopic{name, compressed, false, size_of(messages::color_pixels(message).view)};
@@ -68,11 +69,11 @@ std::optional<ImageTopic> look_at(const std::string& name, const ImageMessage& m
 }
 
 /// Looks at the first message of a topic, or at the next ones if it is damaged.
-std::optional<ImageTopic> look_at(const rosbag::Bag& bag, const std::string& name) {
+std::optional<ImageTopic> look_at(const rosbag::Bag& bag, const std::string& name, std::string& fault) {
   rosbag::View view(bag, rosbag::TopicQuery(name));
   int tries = 10;
   for (auto it = view.begin(); it != view.end() && tries > 0; ++it, --tries) {
-    if (const std::optional<ImageTopic> topic = look_at(name, to_image_message(*it))) return topic;
+    if (const std::optional<ImageTopic> topic = look_at(name, to_image_message(*it), fault)) return topic;
   }
   return std::nullopt;
 }
@@ -101,7 +102,12 @@ class Finder {
     for (const rosbag::ConnectionInfo* connection : view.getConnections()) types_[connection->topic] = connection->datatype;
     for (const auto& [name, type] : types_) {
       if (type != "sensor_msgs/Image" && type != "sensor_msgs/CompressedImage") continue;
-      if (const std::optional<ImageTopic> image = look_at(bag, name)) images_.push_back(*image);
+      std::string fault;
+      if (const std::optional<ImageTopic> image = look_at(bag, name, fault)) {
+        images_.push_back(*image);
+      } else if (!fault.empty()) {
+        unusable_ += " The images of " + name + " cannot be used: " + fault + ".";
+      }
     }
   }
 
@@ -112,8 +118,8 @@ class Finder {
     prefer(found, [](const ImageTopic& topic) { return name_has(topic.name, {"depth"}); });
     drop_duplicates(found);
     if (found.empty()) {
-      throw Error(bag_.getFileName() +
-                  " has no depth images (16UC1, mono16, 32FC1, 16-bit PNG); its image topics are: " + listed(names_of(images_)) + ".");
+      throw Error(bag_.getFileName() + " has no depth images (16UC1, mono16, 32FC1, 16-bit PNG); its image topics are: " +
+                  listed(names_of(images_)) + "." + unusable_);
     }
     if (found.size() > 1) throw_ambiguous("depth", names_of(found));
     return found.front();
@@ -152,7 +158,7 @@ class Finder {
       if (strip_slash(topic.name) == strip_slash(wanted)) return topic;
     }
     throw Error(bag_.getFileName() + " has no " + what + " images on " + wanted + "; its image topics are: " + listed(names_of(images_)) +
-                ".");
+                "." + unusable_);
   }
 
   [[noreturn]] void throw_ambiguous(const std::string& what, const std::vector<std::string>& names) const {
@@ -163,6 +169,7 @@ class Finder {
   const rosbag::Bag& bag_;
   std::map<std::string, std::string> types_;  ///< of all topics
   std::vector<ImageTopic> images_;            ///< those that can be read
+  std::string unusable_;                      ///< sentences about the others
 };
 
 }  // namespace

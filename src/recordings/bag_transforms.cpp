@@ -1,10 +1,10 @@
 #include "recordings/bag_transforms.hpp"
 
-#include <tf2/exceptions.h>
-
 #include <cmath>
+#include <stdexcept>
 
 #include "frontier_surfels/types.hpp"
+#include "recordings/bag_topics.hpp"
 #include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
@@ -14,7 +14,6 @@ using messages::strip_slash;
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-2;
-constexpr double kForever = 1e9;  // [s]; longer than any bag, and still far from what ros::Time can hold
 
 bool is_usable(const geometry_msgs::TransformStamped& transform) {
   const auto& t = transform.transform.translation;
@@ -37,13 +36,14 @@ void normalise(geometry_msgs::Quaternion& q) {
   q.w /= norm;
 }
 
-BagTransforms::BagTransforms() : buffer_(ros::Duration(kForever)) {}
+/// Transforms are kept as long as possible: tf2 adds this duration to stamps, and ros::Time can just hold the sum.
+BagTransforms::BagTransforms() : buffer_(ros::Duration(kLatestTime, 0)) {}
 
 void BagTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
   for (geometry_msgs::TransformStamped transform : message.transforms) {
     transform.header.frame_id = strip_slash(transform.header.frame_id);
     transform.child_frame_id = strip_slash(transform.child_frame_id);
-    if (!is_usable(transform)) {
+    if (!is_usable(transform) || !(is_static || is_believed(transform.header.stamp))) {
       ++damaged_;
       continue;
     }
@@ -52,7 +52,7 @@ void BagTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
     try {
       buffer_.setTransform(transform, "bag", is_static);
       parent_of_[transform.child_frame_id] = transform.header.frame_id;
-    } catch (const std::runtime_error&) {  // a stamp near the end of ros::Time
+    } catch (const std::runtime_error&) {  // whatever else tf2 refuses
       ++damaged_;
     }
   }
@@ -83,10 +83,11 @@ std::string BagTransforms::frames() const {
 
 Eigen::Isometry3d BagTransforms::T_world_frame(const std::string& world, const std::string& frame, const ros::Time& stamp) const {
   if (stamp.isZero()) throw BadFrame("its stamp is 0, which is not a valid time");
+  if (!is_believed(stamp)) throw BadFrame("its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038");
   if (frame == world) throw BadFrame("its frame is the world frame '" + world + "' itself");
   try {
     return messages::to_isometry(buffer_.lookupTransform(world, frame, stamp).transform);
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::runtime_error& error) {  // of tf2, or of ros::Time
     throw BadFrame("its pose is not known (" + std::string(error.what()) + ")");
   }
 }

@@ -34,7 +34,8 @@ class BagTransforms {
   /// Pose of `frame` in `world` at `stamp`. @throws BadFrame if it is not known
   Eigen::Isometry3d T_world_frame(const std::string& world, const std::string& frame, const ros::Time& stamp) const;
 
-  /// Number of transforms that were left out because they are not finite, no rotations, or without names.
+  /// Number of transforms that were left out because they are not finite, no rotations, without names, or stamped later than in
+  /// 2038.
   std::size_t damaged() const { return damaged_; }
 
  private:

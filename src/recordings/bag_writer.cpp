@@ -10,8 +10,10 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 
+#include "config/config_text.hpp"
 #include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
@@ -31,12 +33,12 @@ InverseDepthQuantisation default_quantisation() {
   return {a, 1 - a / kLargestDepth};
 }
 
-/// Depth as CV_32FC1 [m], where NaN means no measurement (REP 118).
-cv::Mat to_metres(const cv::Mat& depth) {
+/// Depth as CV_32FC1 [m], where NaN means no measurement (REP 118). @param depth_unit  of 16-bit images [m]
+cv::Mat to_metres(const cv::Mat& depth, double depth_unit) {
   if (depth.type() == CV_32FC1) return depth;
   cv::Mat metres(depth.size(), CV_32FC1);
-  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [](std::uint16_t value) {
-    return value == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value) / kMillimetresPerMetre;
+  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(), [depth_unit](std::uint16_t value) {
+    return value == 0 || value == 65535 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value * depth_unit);
   });
   return metres;
 }
@@ -46,10 +48,11 @@ std::uint16_t to_sixteen_bits(float value) {
   return std::isfinite(value) && value > 0 && value < 65535.5f ? static_cast<std::uint16_t>(std::lround(value)) : 0;
 }
 
-cv::Mat to_millimetres(const cv::Mat& depth) {
-  if (depth.type() == CV_16UC1) return depth;
+cv::Mat to_millimetres(const cv::Mat& depth, double depth_unit) {
+  if (depth.type() == CV_16UC1 && depth_unit == BagOptions().depth_unit) return depth;
+  const cv::Mat metres = to_metres(depth, depth_unit);
   cv::Mat millimetres(depth.size(), CV_16UC1);
-  std::transform(depth.begin<float>(), depth.end<float>(), millimetres.begin<std::uint16_t>(),
+  std::transform(metres.begin<float>(), metres.end<float>(), millimetres.begin<std::uint16_t>(),
                  [](float value) { return to_sixteen_bits(value * kMillimetresPerMetre); });
   return millimetres;
 }
@@ -108,12 +111,25 @@ std::vector<Link> constant_links() {
           {"openni_rgb_frame", "openni_rgb_optical_frame", optical}};
 }
 
+/// The destructor of a bag that is open closes it, and ends the program if that fails, as it does on a full disk. A bag that could not be
+/// closed is therefore kept and never destroyed.
+struct BagDeleter {
+  void operator()(rosbag::Bag* bag) const {
+    static auto* const unclosed = new std::vector<rosbag::Bag*>();
+    if (bag->isOpen()) {
+      unclosed->push_back(bag);
+    } else {
+      delete bag;
+    }
+  }
+};
+
 class Writer {
  public:
   Writer(const std::string& path, const BagOptions& options) : options_(options), links_(constant_links()) {
-    bag_.open(path, rosbag::bagmode::Write);
-    if (options.compression == "lz4") bag_.setCompression(rosbag::compression::LZ4);
-    if (options.compression == "bz2") bag_.setCompression(rosbag::compression::BZ2);
+    bag_->open(path, rosbag::bagmode::Write);
+    if (options.compression == "lz4") bag_->setCompression(rosbag::compression::LZ4);
+    if (options.compression == "bz2") bag_->setCompression(rosbag::compression::BZ2);
   }
 
   void write(const RecordedFrame& frame, const ros::Time& stamp) {
@@ -123,7 +139,7 @@ class Writer {
     first_ = false;
   }
 
-  void close() { bag_.close(); }
+  void close() { bag_->close(); }
 
  private:
   void write_transforms(const Eigen::Isometry3d& T_world_camera, const ros::Time& stamp) {
@@ -138,13 +154,14 @@ class Writer {
     if (!options_.static_transforms) {
       moving.transforms.insert(moving.transforms.end(), constant.transforms.begin(), constant.transforms.end());
     } else if (first_) {
-      bag_.write("/tf_static", stamp, constant, latched_header());
+      bag_->write("/tf_static", stamp, constant, latched_header());
     }
-    bag_.write("/tf", stamp, moving);
+    bag_->write("/tf", stamp, moving);
   }
 
   void write_depth(const RecordedFrame& frame, const ros::Time& stamp) {
-    const cv::Mat depth = options_.encoding == encodings::TYPE_32FC1 ? to_metres(frame.depth) : to_millimetres(frame.depth);
+    const cv::Mat depth = options_.encoding == encodings::TYPE_32FC1 ? to_metres(frame.depth, options_.depth_unit)
+                                                                     : to_millimetres(frame.depth, options_.depth_unit);
     if (options_.compressed) {
       publish(options_.depth_topic + "/compressedDepth", to_compressed_depth(depth, options_.encoding), stamp);
     } else {
@@ -166,7 +183,7 @@ class Writer {
   void publish(const std::string& topic, Message message, const ros::Time& stamp) {
     message.header.stamp = stamp;
     message.header.frame_id = frame_name("openni_rgb_optical_frame");
-    bag_.write(topic, stamp, message);
+    bag_->write(topic, stamp, message);
   }
 
   std::string frame_name(const std::string& name) const { return (options_.leading_slashes ? "/" : "") + name; }
@@ -200,7 +217,7 @@ class Writer {
 
   BagOptions options_;
   std::vector<Link> links_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag, BagDeleter> bag_{new rosbag::Bag()};
   bool first_ = true;
 };
 
@@ -208,6 +225,7 @@ void check(const BagOptions& options) {
   if (options.encoding != "32FC1" && options.encoding != "16UC1") {
     throw Error("Depth is written as 32FC1 or 16UC1, not as '" + options.encoding + "'.");
   }
+  if (!(options.depth_unit > 0 && std::isfinite(options.depth_unit))) throw Error("The depth unit must be above 0.");
   if (options.compression != "none" && options.compression != "lz4" && options.compression != "bz2") {
     throw Error("A bag's compression is none, lz4 or bz2, not '" + options.compression + "'.");
   }
@@ -215,7 +233,7 @@ void check(const BagOptions& options) {
 
 ros::Time to_ros_time(double stamp) {
   if (!(stamp > 0) || stamp >= std::numeric_limits<std::uint32_t>::max()) {
-    throw Error("The stamp " + std::to_string(stamp) +
+    throw Error("The stamp " + to_text(stamp) +
                 " s is not a valid time of ROS, which must be above 0 and below 2^32 s: correct the stamps of the recording.");
   }
   return ros::Time(stamp);

@@ -14,6 +14,7 @@ struct BagOptions {
   std::string depth_info_topic = "/camera/depth/camera_info";
   std::string color_topic = "/camera/rgb/image_color";
   std::string color_info_topic = "/camera/rgb/camera_info";
+  double depth_unit = 0.001;       ///< one step of the recording's 16-bit images [m]
   std::string encoding = "32FC1";  ///< of depth images: 32FC1 [m] or 16UC1 [mm]
   bool compressed =
       false;  ///< writes compressedDepth (16UC1 lossless; 32FC1 quantised, up to 10 m) and JPEG, on topics with these suffixes

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
+#include "frontier_surfels/number_text.hpp"
 #include "recordings/text_files.hpp"
 
 namespace frontier_surfels::replay {
@@ -65,7 +66,7 @@ Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
   }
   const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
-    throw BadFrame("the quaternion of its pose has the length " + std::to_string(rotation.norm()) + " instead of 1");
+    throw BadFrame("the quaternion of its pose has the length " + fixed_text(rotation.norm(), 6) + " instead of 1");
   }
   return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
 }
@@ -134,7 +135,13 @@ void FolderSource::list_tum_images() {
   if (fs::exists(folder_ / "rgb.txt")) colors = read_file_list(folder_ / "rgb.txt");
   std::stable_sort(colors.begin(), colors.end(), by_stamp);
 
-  for (const StampedFile& image : read_file_list(folder_ / "depth.txt")) {
+  std::vector<StampedFile> images = read_file_list(folder_ / "depth.txt");
+  if (!std::is_sorted(images.begin(), images.end(), by_stamp)) {
+    std::stable_sort(images.begin(), images.end(), by_stamp);
+    notes_.push_back("The images of " + (folder_ / "depth.txt").string() +
+                     " are not listed in the order of their stamps: they are sorted.");
+  }
+  for (const StampedFile& image : images) {
     const StampedPose* pose = nearest(poses, image.stamp);
     const StampedFile* color = nearest(colors, image.stamp);
     entries_.push_back(
@@ -194,7 +201,7 @@ RecordedFrame FolderSource::read(const Entry& entry) {
   if (tum_layout_) {
     cv::Mat metres(frame.depth.size(), CV_32FC1);
     std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), metres.begin<float>(),
-                   [](std::uint16_t value) { return static_cast<float>(value) / kTumUnitsPerMetre; });
+                   [](std::uint16_t value) { return value == 65535 ? 0 : static_cast<float>(value) / kTumUnitsPerMetre; });
     frame.depth = metres;
   }
   if (!entry.color.empty()) frame.color = read_color(entry, frame.depth.size());

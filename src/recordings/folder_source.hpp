@@ -23,6 +23,8 @@ class FolderSource : public FrameSource {
   std::optional<RecordedFrame> next() override;
   const std::vector<std::string>& skipped() const override { return skipped_; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::string world_frame() const override { return "world of " + poses_file(); }
+  std::string if_still() const override { return "correct the poses in " + poses_file(); }
 
  private:
   /// The files and the pose of a frame, before any image is read.
@@ -33,6 +35,7 @@ class FolderSource : public FrameSource {
     std::vector<double> pose;     ///< tx ty tz qx qy qz qw as recorded; empty if there is none
   };
 
+  std::string poses_file() const { return tum_layout_ ? "groundtruth.txt" : "poses.txt"; }
   void list_numbered_images();
   void list_tum_images();
   void choose_tum_camera();

@@ -11,7 +11,7 @@ namespace frontier_surfels::replay {
 /// A frame that owns its images. They are in this machine's byte order.
 struct RecordedFrame {
   double stamp = 0;  ///< [s]
-  cv::Mat depth;     ///< CV_16UC1 [mm] or CV_32FC1 [m]
+  cv::Mat depth;     ///< CV_16UC1 [Config::depth_unit] or CV_32FC1 [m]
   cv::Mat color;     ///< CV_8UC3, BGR, registered to depth; empty where there is none
   Intrinsics intrinsics;
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
@@ -31,7 +31,7 @@ inline DepthFrame RecordedFrame::view() const {
   frame.depth.width = depth.cols;
   frame.depth.height = depth.rows;
   frame.depth.step = depth.step[0];
-  frame.depth.encoding = depth.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  frame.depth.encoding = depth.type() == CV_16UC1 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   frame.depth.data = depth.data;
   if (color.empty()) return frame;
 

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "config/c_locale.hpp"
+
 namespace frontier_surfels::replay {
 namespace {
 
@@ -19,6 +21,8 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
   std::vector<Line> lines;
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {
+    constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";  // some editors begin UTF-8 files with it
+    if (number == 1 && text.compare(0, 3, kByteOrderMark) == 0) text.erase(0, 3);
     std::istringstream stream(text.substr(0, text.find('#')));
     Line line{path.string() + ", line " + std::to_string(number), {}};
     for (std::string word; stream >> word;) line.words.push_back(word);
@@ -30,6 +34,7 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
 /// Accepts nan and inf, unlike a stream: trackers write them where they have lost the camera.
 double to_number(const Line& line, std::size_t index) {
   const std::string& word = line.words[index];
+  const CLocale c_locale;
   char* end = nullptr;
   const double number = std::strtod(word.c_str(), &end);
   if (end != word.c_str() + word.size()) throw Error(line.where + ": '" + word + "' is not a number.");

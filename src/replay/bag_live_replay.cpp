@@ -35,6 +35,9 @@ void init_ros(const std::vector<std::string>& arguments) {
   }
 }
 
+/// time + ahead, or the largest time.
+ros::Time later(const ros::Time& time, const ros::Duration& ahead) { return ros::TIME_MAX - ahead < time ? ros::TIME_MAX : time + ahead; }
+
 Report to_report(const FrameReport& message) {
   Report report;
   report.stamp = message.header.stamp.toSec();
@@ -72,6 +75,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
     return;
   }
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
+  record.depths = count_depths(frame.view().depth, run.config);
   if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view());
   run.frames.push_back(std::move(record));
 }
@@ -80,15 +84,25 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
 
 BagLiveReplay::BagLiveReplay(const Recording& recording, const LiveOptions& options, const std::function<bool()>& stop)
     : recording_(recording) {
-  if (std::filesystem::is_directory(recording.path)) {
+  std::error_code ignored;  // a name may be too long to be asked for
+  if (std::filesystem::is_directory(recording.path, ignored)) {
     throw Error("'" + recording.path + "' is a folder, but --live plays bags: make a bag of it with sequence_to_bag.");
   }
-  if (!std::filesystem::exists(recording.path)) throw Error("There is no bag '" + recording.path + "'.");
+  if (!std::filesystem::exists(recording.path, ignored)) throw Error("There is no bag '" + recording.path + "'.");
   init_ros(options.ros_arguments);
   mapper_ = std::make_unique<RunningMapper>(options.mapper, stop);
+  refuse_map_folder();
   open_bag();
   player_ = std::make_unique<BagPlayer>(*source_, *mapper_);
   tell_what_is_not_heard();
+}
+
+/// The map is taken from topics, which have only what is in memory, and it is reset before, which would empty the folder.
+void BagLiveReplay::refuse_map_folder() const {
+  const std::string& folder = mapper_->config().map_folder;
+  if (folder.empty()) return;
+  throw Error("The mapper " + mapper_->name() + " keeps its map in the folder '" + folder +
+              "', which a replay would empty: start a mapper without map_folder, or leave --live out.");
 }
 
 /// Opens the bag with the world frame of the mapper, so that both use the same poses.
@@ -101,7 +115,8 @@ void BagLiveReplay::open_bag() {
   world = mapper_->world_frame();
   auto source = open_source(recording_.path, recording_.options);
   source_.reset(dynamic_cast<BagSource*>(source.get()));
-  if (source_) source.release();
+  if (!source_) throw Error("'" + recording_.path + "' is no bag: --live plays bags only.");
+  source.release();
 }
 
 void BagLiveReplay::tell_what_is_not_heard() {
@@ -128,13 +143,13 @@ void BagLiveReplay::begin(const Played& first) {
   mapper_->wait(kHeadStart);
   mapper_->reset();
   player_->send_static_transforms();
-  player_->send_transforms(first.message.getTime() + kTransformsAhead);
+  player_->send_transforms(later(first.message.getTime(), kTransformsAhead));
   player_->send_camera_and_color(first.stamp);
   mapper_->wait(kHeadStart);
 }
 
 void BagLiveReplay::send(const Played& played, const ros::Duration& transforms_ahead) {
-  player_->send_transforms(played.message.getTime() + transforms_ahead);
+  player_->send_transforms(later(played.message.getTime(), transforms_ahead));
   player_->send_depth(played.message, played.stamp);
 }
 
@@ -148,8 +163,7 @@ FrameReport BagLiveReplay::answer_to(const Played& played, double timeout) {
 }
 
 Run BagLiveReplay::map(Yardsticks* yardsticks, const std::function<bool()>& stop) {
-  Run run;
-  run.config = config();
+  Run run = new_run(*source_, config(), mapper_->device());
   FrameReport report;
   Progress progress("Mapping", static_cast<double>(source_->size()), "frames");
   std::unique_ptr<Played> played = next();
@@ -164,12 +178,11 @@ Run BagLiveReplay::map(Yardsticks* yardsticks, const std::function<bool()>& stop
     run.stopped = stop();
     played = std::move(following);
   }
-  run.skipped.insert(run.skipped.end(), source_->skipped().begin(), source_->skipped().end());
+  finish_run(*source_, run);
   if (run.frames.empty()) throw nothing_usable(recording_, run.skipped);
 
   run.surfels = mapper_->surfels(report.sequence);
   run.statistics = statistics_of(run.surfels, run.frames.back().report);
-  run.device = mapper_->device();
   run.peak_rss_mb = peak_rss_mb();
   return run;
 }

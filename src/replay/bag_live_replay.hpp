@@ -25,6 +25,7 @@ class BagLiveReplay : public LiveReplay {
     ros::Time stamp;
   };
 
+  void refuse_map_folder() const;
   void open_bag();
   void tell_what_is_not_heard();
   void begin(const Played& first);

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "config/c_locale.hpp"
+
 namespace frontier_surfels::replay {
 
 Progress::Progress(std::string title, double total, std::string unit)
@@ -34,6 +36,7 @@ std::string Progress::line(const std::string& title, double done, double total, 
   constexpr int kWidth = 30;
   const double share = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0;
   const int filled = static_cast<int>(share * kWidth);
+  const CLocale c_locale;
   char text[200];
   std::snprintf(text, sizeof(text), "%-8s [%s%s] %3.0f %%", title.c_str(), std::string(filled, '#').c_str(),
                 std::string(kWidth - filled, '.').c_str(), 100 * share);

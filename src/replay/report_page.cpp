@@ -1,10 +1,13 @@
 #include "replay/report_page.hpp"
 
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
+#include <regex>
 
 #include "frontier_surfels/types.hpp"
 
@@ -26,18 +29,47 @@ fs::path find_script() {
               "' nor in the source tree: install the package again.");
 }
 
-/// @return the exit code, or -1 if there is none
+/// The attributes of a process that gets SIGINT blocked. The script unblocks it when it can end without a traceback.
+class SpawnAttributes {
+ public:
+  SpawnAttributes() {
+    posix_spawnattr_init(&attributes_);
+    sigset_t interrupt;
+    sigemptyset(&interrupt);
+    sigaddset(&interrupt, SIGINT);
+    posix_spawnattr_setsigmask(&attributes_, &interrupt);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
+  }
+  ~SpawnAttributes() { posix_spawnattr_destroy(&attributes_); }
+  SpawnAttributes(const SpawnAttributes&) = delete;
+  SpawnAttributes& operator=(const SpawnAttributes&) = delete;
+  const posix_spawnattr_t* get() const { return &attributes_; }
+
+ private:
+  posix_spawnattr_t attributes_;
+};
+
+/// @return the status of waitpid(), or -1 if Python could not be started
 int run_python(std::string script, std::string directory) {
   std::string python = kPython;
   std::string no_environment = "-E";  // PYTHONPATH may name another Python's modules
   std::string no_bytecode = "-B";     // the folder of an installed script may be read-only
   char* arguments[] = {python.data(), no_environment.data(), no_bytecode.data(), script.data(), directory.data(), nullptr};
+  const SpawnAttributes attributes;
   pid_t pid = 0;
-  if (posix_spawn(&pid, kPython, nullptr, nullptr, arguments, environ) != 0) return -1;
+  if (posix_spawn(&pid, kPython, nullptr, attributes.get(), arguments, environ) != 0) return -1;
   int status = 0;
   while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
   }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return status;
+}
+
+/// A word of a shell command that stands for this text.
+std::string quoted(const std::string& text) {
+  const bool is_plain =
+      text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+:@%") == std::string::npos;
+  if (is_plain && !text.empty()) return text;
+  return "'" + std::regex_replace(text, std::regex("'"), R"('\'')") + "'";
 }
 
 }  // namespace
@@ -47,10 +79,12 @@ void make_report_page(const std::string& directory) {
   if (access(kPython, X_OK) != 0) {
     throw Error(std::string("report.html needs ") + kPython + ", which is missing; the other files are in '" + directory + "'.");
   }
-  if (run_python(script.string(), directory) != 0) {
-    throw Error("report.html could not be made; the other files are in '" + directory +
-                "'. Try again with: " + script.lexically_normal().string() + " " + directory);
-  }
+  const int status = run_python(script.string(), directory);
+  if (status == 0) return;
+  const bool interrupted = WIFSIGNALED(status) && WTERMSIG(status) == SIGINT;
+  throw Error("report.html " + std::string(interrupted ? "is not made, because of Ctrl-C" : "could not be made") +
+              "; the other files are in '" + directory + "'. Try again with: " + quoted(script.lexically_normal().string()) + " " +
+              quoted(directory));
 }
 
 }  // namespace frontier_surfels::replay

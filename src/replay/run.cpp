@@ -1,9 +1,12 @@
 #include "replay/run.hpp"
 
+#include <algorithm>
+#include <ctime>
 #include <fstream>
 
 #include "replay/progress.hpp"
 #include "scoring/cpu_clock.hpp"
+#include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -12,14 +15,16 @@ constexpr std::size_t kSegments = 40000;  // of the exact test: the standard err
 
 }  // namespace
 
-Yardsticks::Yardsticks(const Config& config, double octomap_resolution, bool exact) : config_(config) {
-  if (exact) exact_.emplace(config.z_min, config.z_max, config.decimation);
-  if (octomap_resolution > 0) octomap_.emplace(octomap_resolution, config.z_min, config.z_max, config.decimation);
+Yardsticks::Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact)
+    : config_(config), octomap_resolution_(octomap_resolution) {
+  if (exact) exact_.emplace(config);
 }
 
 std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
+  if (pixel_spacing_ == 0) pixel_spacing_ = config_.decimation * config_.z_max / std::min(frame.intrinsics.fx, frame.intrinsics.fy);
   if (exact_) exact_->add(frame);
-  if (!octomap_) return std::nullopt;
+  if (octomap_resolution() == 0) return std::nullopt;
+  if (!octomap_) octomap_.emplace(octomap_resolution(), config_);
   return octomap_->add(frame);
 }
 
@@ -28,16 +33,31 @@ const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
   return *octomap_boundary_;
 }
 
-bool Yardsticks::fit(const Config& config) const {
-  return config.z_min == config_.z_min && config.z_max == config_.z_max && config.decimation == config_.decimation;
+bool Yardsticks::fit(const Config& config) const { return scoring::DepthReading(config) == scoring::DepthReading(config_); }
+
+Run new_run(const FrameSource& source, const Config& config, const std::string& device) {
+  Run run;
+  run.config = config;
+  run.device = device;
+  run.world_frame = source.world_frame();
+  run.if_still = source.if_still();
+  const std::time_t now = std::time(nullptr);
+  std::tm utc = {};
+  gmtime_r(&now, &utc);
+  char text[40];
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &utc);
+  run.date = text;
+  return run;
+}
+
+void finish_run(const FrameSource& source, Run& run) {
+  run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
+  run.notes = source.notes();
 }
 
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
                const std::function<bool()>& stop) {
-  Run run;
-  run.config = mapper.config();
-  run.device = mapper.device();
-
+  Run run = new_run(source, mapper.config(), mapper.device());
   Progress progress("Mapping", static_cast<double>(source.size()), "frames");
   while (const auto frame = source.next()) {
     const DepthFrame view = frame->view();
@@ -45,6 +65,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       const double cpu_before_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID);
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
       record.cpu_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_before_ms;
+      record.depths = count_depths(view.depth, run.config);
       after_frame(view, record);
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {
@@ -56,22 +77,35 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       break;
     }
   }
-  run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
+  finish_run(source, run);
   return run;
 }
 
 Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
   const auto source = open_source(recording.path, recording.options);
   Mapper mapper(config);
+  if (!config.map_folder.empty() && !mapper.whole_map().empty()) {
+    throw Error("The map folder '" + config.map_folder +
+                "' already has a map, which would be scored as if it were made of this recording: delete the folder, or choose another.");
+  }
   const auto measure = [yardsticks](const DepthFrame& view, FrameRecord& record) {
     if (yardsticks != nullptr) record.octomap = yardsticks->add(view);
   };
   Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty()) throw nothing_usable(recording, run.skipped);
 
-  run.surfels = mapper.surfels();
+  run.surfels = mapper.whole_map();
   run.statistics = mapper.statistics();
+  run.statistics.surfels = run.surfels.size();  // on disk, too
+  run.statistics.occupied = static_cast<std::size_t>(
+      std::count_if(run.surfels.begin(), run.surfels.end(), [](const Surfel& surfel) { return surfel.label == Label::kOccupied; }));
+  run.statistics.frontier = run.statistics.surfels - run.statistics.occupied;
   run.peak_rss_mb = peak_rss_mb();
+  try {
+    mapper.flush();
+  } catch (const FileError& fault) {  // the scores are worth having all the same
+    run.unsaved = std::string("The map folder lacks a part of the map. ") + fault.what();
+  }
   return run;
 }
 

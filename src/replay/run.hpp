@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/depth_census.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
 #include "frontier_surfels/scoring/octomap_truth.hpp"
@@ -21,26 +22,35 @@ struct Recording {
   SourceOptions options;
 };
 
+/// Side of OctoMap's voxels [m]; 0: no OctoMap; empty: automatic, as far apart as the pixels that are used at z_max, so that OctoMap has no
+/// gaps between rays.
+using OctomapResolution = std::optional<double>;
+
 /// What a map is scored against: the exact test and OctoMap. They must get the same frames as the map.
 class Yardsticks {
  public:
-  /// @param octomap_resolution  [m]; 0: no OctoMap
-  Yardsticks(const Config& config, double octomap_resolution, bool exact);
+  Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact);
 
   /// @return the time of OctoMap for this frame, if there is an OctoMap
   std::optional<scoring::InsertionTime> add(const DepthFrame& frame);
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
-  const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }
+  const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }  ///< empty before the first frame as well
+
+  double octomap_resolution() const { return octomap_resolution_.value_or(pixel_spacing_); }  ///< [m]; 0: none
+  /// Largest distance between neighbouring pixels at z_max, of the first frame [m].
+  double pixel_spacing() const { return pixel_spacing_; }
 
   /// OctoMap's boundary surfels M; computed once, after the last frame.
   const std::vector<Surfel>& octomap_boundary() const;
 
-  /// Whether a map made with `config` can be scored with these yardsticks: they must use the same depth range and the same pixels.
+  /// Whether a map made with `config` can be scored with these yardsticks: they must read depth images alike.
   bool fit(const Config& config) const;
 
  private:
   Config config_;
+  OctomapResolution octomap_resolution_;
+  double pixel_spacing_ = 0;
   std::optional<scoring::ExactTest> exact_;
   std::optional<scoring::OctomapTruth> octomap_;
   mutable std::optional<std::vector<Surfel>> octomap_boundary_;
@@ -50,20 +60,32 @@ struct FrameRecord {
   Report report;
   Eigen::Isometry3d T_world_camera;
   std::optional<scoring::InsertionTime> octomap;
+  DepthCensus depths = {};
   double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
 };
 
 /// The result of mapping a recording.
 struct Run {
   Config config;
+  std::string date;         ///< of the start, UTC, as 2020-12-31T23:59:59Z
+  std::string world_frame;  ///< of the poses
+  std::string if_still;     ///< see FrameSource
   std::string device;
   std::vector<FrameRecord> frames;
   std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
+  std::vector<std::string> notes;    ///< see FrameSource
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
   bool stopped = false;    ///< before the end of the recording
+  std::string unsaved;     ///< why the map folder lacks a part of the map; empty: it has all, or there is none
 };
+
+/// A run that has not begun: its date is now, and it knows where the poses come from.
+Run new_run(const FrameSource& source, const Config& config, const std::string& device);
+
+/// Adds the notes of the source, and its skipped frames to those of the mapper.
+void finish_run(const FrameSource& source, Run& run);
 
 /// Maps the remaining frames of `source`. Does not set the surfels, the statistics and the peak memory of the result.
 /// @param after_frame  called with every frame that the mapper took, and its record

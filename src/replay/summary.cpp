@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
+
+#include "config/c_locale.hpp"
+#include "replay/warnings.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -46,9 +50,18 @@ double stage_ms(const FrameRecord& frame, const std::string& name) {
 
 double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
 
+double cpu_ms(const FrameRecord& frame) { return frame.cpu_ms; }
+
+bool cpu_is_measured(const std::vector<FrameRecord>& frames) {
+  return std::all_of(frames.begin(), frames.end(), [](const FrameRecord& frame) { return frame.cpu_ms > 0; });
+}
+
 double octomap_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->wall_ms : 0; }
 
+double octomap_cpu_ms(const FrameRecord& frame) { return frame.octomap ? frame.octomap->cpu_ms : 0; }
+
 std::string formatted(const char* format, double a, double b = 0, double c = 0, double d = 0) {
+  const CLocale c_locale;
   char text[200];
   std::snprintf(text, sizeof(text), format, a, b, c, d);
   return text;
@@ -112,11 +125,27 @@ ordered_json exact_json(const scoring::ExactScore& score) {
           {"miss_1cm", score.miss_1cm},   {"miss_2cm", score.miss_2cm},   {"miss_5cm", score.miss_5cm}, {"label_ok", score.label_ok}};
 }
 
-ordered_json summary_json(const Recording& recording, double octomap_resolution, const Run& run, const Yardsticks& yardsticks,
-                          const Scores& scores) {
+ordered_json reasons_json(const std::vector<FrameRecord>& frames) {
+  const bool still = is_still(frames);
+  ordered_json counts = ordered_json::object();
+  for (const FrameRecord& frame : frames) {
+    const std::string why = reason(frame, still);
+    if (!why.empty()) counts[why] = counts.value(why, 0) + 1;
+  }
+  return counts;
+}
+
+ordered_json summary_json(const Recording& recording, const Run& run, const Yardsticks& yardsticks, const Scores& scores) {
   const std::vector<FrameRecord> warm = warm_frames(run.frames);
   ordered_json json;
   json["input"] = {{"path", recording.path}, {"frames", run.frames.size()}, {"skipped", run.skipped.size()}};
+  json["version"] = FRONTIER_SURFELS_VERSION;
+  json["date"] = run.date;
+  json["world_frame"] = run.world_frame;
+  json["warnings"] = warnings(run);
+  json["reasons"] = reasons_json(run.frames);
+  json["notes"] = run.notes;
+  json["skipped"] = run.skipped;
   json["config"] = config_json(run.config);
   json["device"] = run.device;
   json["surfels"] = {{"total", run.statistics.surfels},
@@ -125,10 +154,13 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
                      {"map_bytes", run.statistics.map_bytes},
                      {"seen_bytes", run.statistics.seen_bytes}};
   json["time_ms"] = time_json(warm, stage_names(run.frames));
+  if (cpu_is_measured(warm)) json["cpu_ms"] = mean_and_median(column(warm, cpu_ms));
   json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
   if (scores.octomap) {
-    json["octomap"] = {{"resolution", octomap_resolution},
+    json["octomap"] = {{"resolution", yardsticks.octomap_resolution()},
+                       {"pixel_spacing", yardsticks.pixel_spacing()},
                        {"time_ms", mean_and_median(column(warm, octomap_ms))},
+                       {"cpu_ms", mean_and_median(column(warm, octomap_cpu_ms))},
                        {"memory_mb", yardsticks.octomap()->memory_mb()}};
     json["octomap"].update(octomap_json(*scores.octomap));
   }
@@ -136,12 +168,20 @@ ordered_json summary_json(const Recording& recording, double octomap_resolution,
   return json;
 }
 
+Error empty_map(const Recording& recording, const ordered_json& summary) {
+  std::string why;
+  for (const auto& warning : summary["warnings"]) why += " " + warning.get<std::string>();
+  if (why.empty()) why = " No frame has seen a surface or free space: check the depth images, and z_min and z_max.";
+  return Error("The map of '" + recording.path + "' is empty." + why);
+}
+
 std::string frames_csv(const std::vector<FrameRecord>& frames) {
   const std::vector<std::string> stages = stage_names(frames);
+  const bool still = is_still(frames);
   const bool octomap = !frames.empty() && frames.front().octomap.has_value();
   std::string csv = "stamp,surfels,created,removed,";
   for (const std::string& name : stages) csv += name + ",";
-  csv += octomap ? "total,octomap_ms\n" : "total\n";
+  csv += octomap ? "total,octomap_ms,reason\n" : "total,reason\n";
   for (const FrameRecord& frame : frames) {
     const Report& report = frame.report;
     csv += exact_text(report.stamp) + "," + std::to_string(report.surfels) + "," + std::to_string(report.created) + "," +
@@ -149,7 +189,7 @@ std::string frames_csv(const std::vector<FrameRecord>& frames) {
     for (const std::string& name : stages) csv += exact_text(stage_ms(frame, name)) + ",";
     csv += exact_text(report.total_ms);
     if (octomap) csv += "," + exact_text(octomap_ms(frame));
-    csv += "\n";
+    csv += "," + reason(frame, still) + "\n";
   }
   return csv;
 }
@@ -184,17 +224,34 @@ std::string result_table(const ordered_json& summary) {
   }
   if (summary.contains("octomap")) {
     const auto& octomap = summary["octomap"];
-    table += formatted("OctoMap     median %.1f ms a frame, %.1f MB; FDR %.2f %%, FOR %.2f %% at 5 cm\n", octomap["time_ms"]["median"],
-                       octomap["memory_mb"], percent(octomap["fdr"]), percent(octomap["for"]));
+    table += formatted("OctoMap     voxels of %.1f mm, median %.1f ms a frame, %.1f MB; ", 1000 * octomap["resolution"].get<double>(),
+                       octomap["time_ms"]["median"], octomap["memory_mb"]);
+    table += formatted("FDR %.2f %%, FOR %.2f %% at 5 cm\n", percent(octomap["fdr"]), percent(octomap["for"]));
+    if (octomap["resolution"] < 0.999 * octomap["pixel_spacing"].get<double>()) {
+      table += formatted("            FOR counts OctoMap's own gaps: at z_max, pixels are %.1f mm apart\n",
+                         1000 * octomap["pixel_spacing"].get<double>());
+    }
+  }
+  for (const char* kind : {"warnings", "notes"}) {
+    constexpr std::size_t kShown = 5;
+    const auto& sentences = summary[kind];
+    for (std::size_t i = 0; i < std::min(sentences.size(), kShown); ++i)
+      table += (kind == std::string("warnings") ? "WARNING     " : "note        ") + sentences[i].get<std::string>() + "\n";
+    if (sentences.size() > kShown) table += "            ... and " + std::to_string(sentences.size() - kShown) + " more in summary.json.\n";
   }
   return table;
 }
 
 void write_file(const std::string& path, const std::string& content) {
-  std::ofstream file(path, std::ios::binary);
+  const std::string unfinished = path + ".unfinished";
+  std::ofstream file(unfinished, std::ios::binary);
   file << content;
   file.close();
-  if (!file) throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
+  std::error_code error;
+  if (file) std::filesystem::rename(unfinished, path, error);
+  if (file && !error) return;
+  std::filesystem::remove(unfinished, error);
+  throw FileError("'" + path + "' cannot be written: check that the folder is writable and the disk is not full.");
 }
 
 }  // namespace frontier_surfels::replay

@@ -33,20 +33,25 @@ nlohmann::ordered_json config_json(const Config& config);
 nlohmann::ordered_json octomap_json(const scoring::OctomapScore& score);
 nlohmann::ordered_json exact_json(const scoring::ExactScore& score);
 
-/// The content of summary.json. `octomap` and `exact` are absent if there are no such scores.
-nlohmann::ordered_json summary_json(const Recording& recording, double octomap_resolution, const Run& run, const Yardsticks& yardsticks,
-                                    const Scores& scores);
+/// The content of summary.json. `octomap` and `exact` are absent if there are no such scores, and `cpu_ms` if the mapper ran in another
+/// process. `warnings` are those of warnings(), `reasons` tells how many frames added nothing for each reason, `notes` are those of the
+/// source, and `skipped` has a sentence for each skipped frame.
+nlohmann::ordered_json summary_json(const Recording& recording, const Run& run, const Yardsticks& yardsticks, const Scores& scores);
 
-/// The content of frames.csv: a line for each frame, with numbers that are read back exactly. The last column is absent without an OctoMap.
+/// The content of frames.csv: a line for each frame, with numbers that are read back exactly. The column octomap_ms is absent without an
+/// OctoMap. The last column is the reason why a frame adds nothing to the map, see reason(); it is empty for most frames.
 std::string frames_csv(const std::vector<FrameRecord>& frames);
 
 /// The poses in the format of TUM RGB-D, a line for each frame: stamp tx ty tz qx qy qz qw, camera to world.
 std::string trajectory_text(const std::vector<FrameRecord>& frames);
 
+/// The error for a recording whose frames were mapped, but left the map empty. @param summary  its summary.json
+Error empty_map(const Recording& recording, const nlohmann::ordered_json& summary);
+
 /// The main figures of a summary.json, for a terminal.
 std::string result_table(const nlohmann::ordered_json& summary);
 
-/// @throws FileError
+/// Writes a file beside `path`, and puts it there when it is complete. @throws FileError
 void write_file(const std::string& path, const std::string& content);
 
 }  // namespace frontier_surfels::replay

@@ -5,6 +5,7 @@
 #include <regex>
 #include <type_traits>
 
+#include "config/c_locale.hpp"
 #include "replay/summary.hpp"
 
 namespace frontier_surfels::replay {
@@ -45,6 +46,7 @@ std::string unit_of(const std::string& name) {
 
 /// @throws std::exception if the text is not a number
 double parse_number(const std::string& text) {
+  const CLocale c_locale;
   std::size_t end = 0;
   const double value = std::stod(text, &end);
   if (end != text.size() || !std::isfinite(value) || std::abs(value) > 1e9) throw std::invalid_argument(text);
@@ -72,6 +74,9 @@ ordered_json point_json(double value, const Run& run, const Scores& scores) {
 }  // namespace
 
 Sweep parse_sweep(const std::string& text, const Config& base) {
+  if (!base.map_folder.empty())
+    throw Error("--sweep: every value begins with an empty map, but map_folder '" + base.map_folder +
+                "' would keep the map of the one before: leave map_folder out.");
   static const std::regex kForm("([a-z_0-9]+)=([^:]+):([^:]+):([0-9]{1,4})");
   std::smatch part;
   if (!std::regex_match(text, part, kForm)) throw Error("--sweep '" + text + "' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9.");
@@ -101,8 +106,8 @@ Sweep parse_sweep(const std::string& text, const Config& base) {
   return sweep;
 }
 
-ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks, double octomap_resolution,
-                       const std::function<bool()>& stop) {
+ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks,
+                       const OctomapResolution& octomap_resolution, const std::function<bool()>& stop) {
   ordered_json values = ordered_json::array();
   for (const Config& config : sweep.configs) {
     if (stop()) break;

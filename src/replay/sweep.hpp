@@ -22,7 +22,7 @@ Sweep parse_sweep(const std::string& text, const Config& base);
 
 /// Maps the recording and scores the map once for each value. A value that changes the depth range or the pixels gets its own yardsticks.
 /// @return sweep.json: {parameter, unit, values: [{value, frames, surfels, time_ms_median, octomap {...}, exact {...}}]}
-nlohmann::ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks, double octomap_resolution,
-                                 const std::function<bool()>& stop);
+nlohmann::ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yardsticks& yardsticks,
+                                 const OctomapResolution& octomap_resolution, const std::function<bool()>& stop);
 
 }  // namespace frontier_surfels::replay

@@ -5,18 +5,27 @@
 #include <frontier_surfels/MapFile.h>
 #include <ros/callback_queue.h>
 #include <ros/console.h>
+#include <ros/init.h>
 #include <ros/publisher.h>
 #include <ros/service_server.h>
 #include <ros/spinner.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 
+#include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <future>
+#include <iostream>
+#include <utility>
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
+#include "frontier_surfels/number_text.hpp"
+#include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
+#include "ros/input/input_watch.hpp"
+#include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
@@ -52,16 +61,21 @@ class MapperRos::Impl {
  public:
   Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
   ~Impl();
+  void stop();
 
  private:
+  void tell_parameters();
   void report_dropped(const DroppedImage& image);
+  void report_missing(const std::string& reason);
 
   // On the mapping thread
   bool map_next();
   void map(CameraInput& camera, const CompleteImage& image);
   FrameReport integrate(CameraInput& camera, const CompleteImage& image);
   void start_again(const ros::Time& from, const ros::Time& to);
+  void show_other_map();
   void publish_changes();
+  void after_work();
 
   // Services
   void start_services();
@@ -73,12 +87,14 @@ class MapperRos::Impl {
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool save_map(MapFile::Request& request, MapFile::Response& response);
   bool load_map(MapFile::Request& request, MapFile::Response& response);
+  std::uint32_t take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const;
   bool get_surfels(GetSurfels::Request& request, GetSurfels::Response& response);
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
-  Mapper mapper_;   // only used by the mapping thread
-  MapState state_;  // only used by the mapping thread
+  Mapper mapper_;                         // only used by the mapping thread
+  MapFolderWatch folder_watch_{mapper_};  // only used by the mapping thread
+  MapState state_;                        // only used by the mapping thread
   FramePoses poses_;
   std::atomic<std::uint32_t> surfels_{0};  ///< in the map, for reports of frames that are not mapped
   std::atomic<std::uint64_t> sequence_{0};
@@ -88,25 +104,41 @@ class MapperRos::Impl {
   std::unique_ptr<Worker> worker_;
   std::vector<std::unique_ptr<CameraInput>> cameras_;
   std::unique_ptr<MapperDiagnostics> diagnostics_;
+  std::unique_ptr<InputWatch> watch_;
   ros::CallbackQueue service_queue_;  // its own, because services wait for the current frame and must not hold up the images
   ros::NodeHandle service_nh_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+  ros::WallTimer folder_timer_;
+  bool stopped_ = false;
 };
 
 MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
     : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame), service_nh_(pnh) {
   reports_ = pnh_.advertise<FrameReport>("report", 100);
-  worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { publish_changes(); });
+  worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { after_work(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
+  diagnostics_->set_map(mapper_.statistics());
+  tell_parameters();
   poses_.start(nh_);
-  for (const auto& camera : cameras_) camera->start(nh_);
+  for (const auto& camera : cameras_) camera->start(nh_, pnh_);
+  watch_ = std::make_unique<InputWatch>(nh_, cameras_, [this](const std::string& reason) { report_missing(reason); });
   worker_->start();
+  if (!config_.mapper.map_folder.empty())  // looked at also while no images come
+    folder_timer_ = nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { worker_->wake(); });
   start_services();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
+}
+
+void MapperRos::Impl::tell_parameters() {
+  NodeConfig in_force = config_;
+  in_force.mapper = mapper_.config();
+  write_parameters(pnh_, in_force);
+  const std::string& folder = in_force.mapper.map_folder;
+  if (!folder.empty()) ROS_INFO("The map is kept in the folder %s.", folder.c_str());
 }
 
 void MapperRos::Impl::start_services() {
@@ -121,10 +153,27 @@ void MapperRos::Impl::start_services() {
 }
 
 MapperRos::Impl::~Impl() {
-  worker_->stop();  // first, because it asks the cameras
+  try {
+    stop();
+  } catch (const std::exception& fault) {
+    ROS_ERROR("%s", fault.what());
+    if (!ros::ok()) std::cerr << "[ERROR] " << fault.what() << std::endl;  // ROS_ERROR prints nothing after the shutdown
+  }
+}
+
+void MapperRos::Impl::stop() {
+  if (std::exchange(stopped_, true)) return;
+  folder_timer_.stop();
+  watch_.reset();
+  worker_->stop();  // before the cameras, because it asks them
   cameras_.clear();
   service_spinner_->stop();
   publisher_.reset();
+  try {
+    mapper_.flush();
+  } catch (const std::exception& fault) {
+    throw FileError(std::string("The end of the map is lost. ") + fault.what());
+  }
 }
 
 void MapperRos::Impl::report_dropped(const DroppedImage& image) {
@@ -137,6 +186,16 @@ void MapperRos::Impl::report_dropped(const DroppedImage& image) {
   message.latency_ms = message.wait_ms = ms_since(image.arrival.time);
   reports_.publish(message);
   diagnostics_->add(message);
+}
+
+void MapperRos::Impl::report_missing(const std::string& reason) {
+  FrameReport message;
+  message.result = FrameReport::NO_INPUT;
+  message.reason = reason;
+  message.surfels = surfels_;
+  message.sequence = sequence_;
+  reports_.publish(message);
+  ROS_WARN("%s", reason.c_str());
 }
 
 /// Maps the earliest image that is ready, of whichever camera. @return false if there is none
@@ -160,7 +219,12 @@ void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
     const FrameReport message = integrate(camera, image);
     reports_.publish(message);
     diagnostics_->add(message);
-    diagnostics_->set_memory(message.map_bytes, message.seen_bytes, message.device_bytes);
+    Statistics map;
+    map.surfels = message.surfels;
+    map.map_bytes = message.map_bytes;
+    map.seen_bytes = message.seen_bytes;
+    map.device_bytes = message.device_bytes;
+    diagnostics_->set_map(map);
   } catch (const DroppedFrame& fault) {
     drop(fault.result, fault.what());
   } catch (const BadFrame& fault) {
@@ -186,6 +250,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   FrameReport message = messages::to_message(report);
   message.header = header;
   message.result = FrameReport::INTEGRATED;
+  message.reason = camera.remarks().on(frame, *image.info, Clock::now());
   message.wait_ms = wait_ms;
   message.latency_ms = ms_since(image.arrival.time);
   return message;
@@ -194,10 +259,18 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
 /// Time has jumped back, for all cameras: an image of another one must not reset the map once more.
 void MapperRos::Impl::start_again(const ros::Time& from, const ros::Time& to) {
   const bool reset = config_.on_time_jump == "reset";
-  ROS_WARN("Time has jumped back by %.1f s: old transforms are forgotten, and the map is %s (~on_time_jump).", messages::seconds(to, from),
-           reset ? "reset" : "kept");
+  ROS_WARN("Time has jumped back by %s s: old transforms are forgotten, and the map is %s (~on_time_jump).",
+           fixed_text(messages::seconds(to, from), 1).c_str(), reset ? "reset" : "kept");
   if (reset) mapper_.reset();
   for (const auto& camera : cameras_) camera->set_last_mapped(std::min(camera->last_mapped(), to));
+}
+
+/// The map has been replaced by another one, and not by a frame: it is told with the time of now.
+void MapperRos::Impl::show_other_map() {
+  surfels_ = static_cast<std::uint32_t>(mapper_.size());
+  sequence_ = mapper_.sequence();
+  state_.stamp = ros::Time::now();
+  diagnostics_->set_map(mapper_.statistics());
 }
 
 void MapperRos::Impl::publish_changes() {
@@ -209,6 +282,11 @@ void MapperRos::Impl::publish_changes() {
   } catch (const std::exception& fault) {
     ROS_ERROR_THROTTLE(5, "The map cannot be published: %s", fault.what());
   }
+}
+
+void MapperRos::Impl::after_work() {
+  publish_changes();
+  diagnostics_->set_map_folder_fault(folder_watch_.look(Clock::now()));
 }
 
 template <typename Message>
@@ -236,8 +314,7 @@ bool MapperRos::Impl::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Resp
   return answer(response, [&] {
     worker_->run_job([&] {
       mapper_.reset();
-      surfels_ = 0;
-      sequence_ = mapper_.sequence();
+      show_other_map();
       for (const auto& camera : cameras_) camera->reset();
     });
     return std::string("The map is empty.");
@@ -255,34 +332,56 @@ bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBo
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
-    const auto surfels = worker_->run_job([&] { return mapper_.surfels(); });
-    write_map(request.path, surfels);  // on this thread, so that mapping goes on
-    return std::to_string(surfels.size()) + " surfels were written to " + request.path + ".";
+    const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
+    const std::string path = absolute_path(request.path);
+    std::error_code ignored;  // a name may be too long to be asked for
+    if (surfels.empty() && std::filesystem::is_regular_file(path, ignored))
+      throw FileError("The map is empty, and was not written over the existing file " + path +
+                      ": delete the file, or choose another path.");
+    write_map(path, surfels);  // on this thread, so that mapping goes on
+    const std::string done = std::to_string(surfels.size()) + " surfels were written to " + path + ".";
+    ROS_INFO("%s", done.c_str());
+    return done;
   });
 }
 
 bool MapperRos::Impl::load_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
+    const std::string path = absolute_path(request.path);
     worker_->run_job([&] {
-      mapper_.load(request.path);
-      surfels_ = static_cast<std::uint32_t>(mapper_.size());
-      sequence_ = mapper_.sequence();
+      mapper_.load(path);
+      show_other_map();
     });
-    return std::to_string(surfels_) + " surfels were read from " + request.path + ".";
+    const std::string done = std::to_string(surfels_) + " surfels were read from " + path + ".";
+    ROS_INFO("%s", done.c_str());
+    return done;
   });
 }
 
+/// Takes the surfels from first_id on, and of these at most `most` or as many as go into a message. @return next_id of the answer
+/// @throws Error if `most` is 0 and they do not go into a message
+std::uint32_t MapperRos::Impl::take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const {
+  const auto before = [](const Surfel& surfel, std::uint32_t id) { return surfel.id < id; };
+  surfels.erase(surfels.begin(), std::lower_bound(surfels.begin(), surfels.end(), first_id, before));
+  const std::size_t limit = static_cast<std::size_t>(config_.message_limit);
+  if (most == 0 || surfels.size() <= std::min(most, limit)) return 0;  // to_cloud() refuses too many
+  const std::uint32_t next_id = surfels[std::min(most, limit)].id;
+  surfels.resize(std::min(most, limit));
+  return next_id;
+}
+
+/// The response has no field for an error. What is thrown becomes the error that the caller of the service gets.
 bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Response& response) {
   const Eigen::AlignedBox3f box(to_vector(request.box_min), to_vector(request.box_max));
   try {
-    const auto surfels = worker_->run_job([&] {
+    auto surfels = worker_->run_job([&] {
       response.sequence = mapper_.sequence();
       return box.min() == box.max() ? mapper_.surfels() : mapper_.surfels(box);
     });
-    response.surfels = messages::to_cloud(surfels, config_.confident_label());
-  } catch (const std::exception& fault) {  // the response has no field for it
-    ROS_WARN("~get_surfels cannot be answered: %s", fault.what());
-    return false;
+    response.next_id = take_part(surfels, request.first_id, request.most);
+    response.surfels = messages::to_cloud(surfels, config_.confident_label(), static_cast<std::size_t>(config_.message_limit));
+  } catch (const std::future_error&) {
+    return false;  // the mapper is shutting down
   }
   response.surfels.header.frame_id = config_.world_frame;
   response.surfels.header.stamp = ros::Time::now();
@@ -291,5 +390,6 @@ bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Resp
 
 MapperRos::MapperRos(const ros::NodeHandle& nh, const ros::NodeHandle& pnh) : impl_(std::make_unique<Impl>(nh, pnh)) {}
 MapperRos::~MapperRos() = default;
+void MapperRos::stop() { impl_->stop(); }
 
 }  // namespace frontier_surfels

@@ -14,7 +14,11 @@ class MapperRos {
   /// Reads the parameters, builds the mapper and subscribes its inputs.
   /// @throws Error with every fault of the parameters, DeviceError
   MapperRos(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
-  ~MapperRos();  ///< returns after the current frame
+  ~MapperRos();  ///< as stop(), but a fault is only logged
+
+  /// Stops mapping after the current frame, and writes the rest of the map to the map folder, if there is one.
+  /// @throws FileError  it cannot be written
+  void stop();
 
  private:
   class Impl;

@@ -15,15 +15,13 @@ constexpr double kSurfelsShare = 0.8;
 
 }  // namespace
 
-ExactTest::ExactTest(double z_min, double z_max, int decimation) : z_min_(z_min), z_max_(z_max), decimation_(decimation) {
-  DepthRange{z_min, z_max, decimation}.check();
-}
+ExactTest::ExactTest(const Config& config) : config_(config) { (void)DepthReading(config); }  // throws if they make no sense
 
 ExactTest::~ExactTest() = default;
 ExactTest::ExactTest(ExactTest&&) noexcept = default;
 ExactTest& ExactTest::operator=(ExactTest&&) noexcept = default;
 
-void ExactTest::add(const DepthFrame& frame) { views_.emplace_back(frame, DepthRange{z_min_, z_max_, decimation_}); }
+void ExactTest::add(const DepthFrame& frame) { views_.emplace_back(frame, DepthReading(config_)); }
 
 std::size_t ExactTest::size() const { return views_.size(); }
 
@@ -32,7 +30,7 @@ bool ExactTest::known(const Eigen::Vector3d& p_world) const {
 }
 
 std::vector<BoundaryPoint> ExactTest::boundary(std::size_t segments, std::uint64_t seed, int threads) const {
-  return find_boundary(views_, z_max_, segments, seed, threads, {});
+  return find_boundary(views_, config_.z_max, segments, seed, threads, {});
 }
 
 ExactScore ExactTest::score(const std::vector<Surfel>& surfels, std::size_t segments, int threads,
@@ -55,7 +53,7 @@ ExactScore ExactTest::score(const std::vector<Surfel>& surfels, std::size_t segm
   score.fdr_2cm = share(tally.beyond_2cm);
   score.fdr_5cm = share(tally.beyond_5cm);
 
-  const auto boundary = find_boundary(views_, z_max_, segments, kSeed, threads, part_of_progress(kSurfelsShare, 1));
+  const auto boundary = find_boundary(views_, config_.z_max, segments, kSeed, threads, part_of_progress(kSurfelsShare, 1));
   judge_completeness(boundary, surfels, score);
   return score;
 }

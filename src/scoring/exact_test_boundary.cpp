@@ -58,7 +58,7 @@ std::vector<Segment> draw_segments(const std::vector<ExactView>& views, std::siz
     do {
       s = static_cast<int>(random.index(view.width()));
       t = static_cast<int>(random.index(view.height()));
-    } while (!(view.depth(s, t) > 0));
+    } while (view.depth(s, t) == 0);
     const double z = (0.02 + 0.96 * random.share()) * view.depth(s, t);
     const Eigen::Vector3d start = view.on_ray(s, t, z);
     segments.push_back({start, random.direction()});

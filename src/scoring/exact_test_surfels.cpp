@@ -11,9 +11,8 @@ namespace frontier_surfels::scoring {
 
 namespace {
 
-constexpr double kProbeStep = 0.002;       // [m] between the probes along the normal
-constexpr int kProbesPerSide = 25;         // 5 cm to either side
-constexpr double kRadiusInVoxels = 0.866;  // radius of a new surfel, sqrt(3)/2 voxels
+constexpr double kProbeStep = 0.002;  // [m] between the probes along the normal
+constexpr int kProbesPerSide = 25;    // 5 cm to either side
 
 /// Side of the cubes whose surfels are judged together [m]: large enough to share the choice of views, small enough for it to leave out
 /// most.
@@ -82,7 +81,7 @@ double distance_to_boundary(const Surfel& surfel, LocalViews& views) {
 }
 
 void count(SurfelTally& tally, const Surfel& surfel, Verdict verdict, double distance) {
-  const double voxel = surfel.radius / kRadiusInVoxels;
+  const double voxel = surfel.radius / kNewRadius;
   ++tally.verdicts[static_cast<std::size_t>(verdict)];
   tally.within_1v += distance <= voxel;
   tally.within_2v += distance <= 2 * voxel;

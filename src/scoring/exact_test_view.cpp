@@ -16,9 +16,9 @@ constexpr double kNearest = 1e-2;
 
 }  // namespace
 
-ExactView::ExactView(const DepthFrame& frame, const DepthRange& range)
+ExactView::ExactView(const DepthFrame& frame, const DepthReading& reading)
     : T_camera_world_(frame.T_world_camera.inverse()), T_world_camera_(frame.T_world_camera) {
-  DecimatedDepth decimated = decimate(frame, range);
+  DecimatedDepth decimated = decimate(frame, reading);
   fx_ = decimated.intrinsics.fx;
   fy_ = decimated.intrinsics.fy;
   cx_ = decimated.intrinsics.cx;
@@ -26,7 +26,7 @@ ExactView::ExactView(const DepthFrame& frame, const DepthRange& range)
   width_ = decimated.intrinsics.width;
   height_ = decimated.intrinsics.height;
   depth_ = std::move(decimated.depth);
-  has_measurements_ = std::any_of(depth_.begin(), depth_.end(), [](float d) { return d > 0; });
+  has_measurements_ = std::any_of(depth_.begin(), depth_.end(), [](float d) { return d != 0; });
   make_tiles();
 }
 

@@ -1,6 +1,7 @@
 /// One frame of the exact test: what it has seen, and quick bounds on that for a whole ball.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "scoring/decimated_depth.hpp"
@@ -12,23 +13,23 @@ enum class Coverage { kNone, kSome, kAll };
 
 class ExactView {
  public:
-  ExactView(const DepthFrame& frame, const DepthRange& range);
+  ExactView(const DepthFrame& frame, const DepthReading& reading);
 
   int width() const { return width_; }
   int height() const { return height_; }
   bool has_measurements() const { return has_measurements_; }
-  /// [m]; 0: no measurement
-  float depth(int s, int t) const { return depth_[static_cast<std::size_t>(t) * width_ + s]; }
+  /// Depth up to which a pixel has seen free space [m]; 0: no measurement.
+  float depth(int s, int t) const { return std::abs(signed_depth(s, t)); }
 
   /// The point at `z` [m] on the ray through the centre of a pixel, world.
   Eigen::Vector3d on_ray(int s, int t, double z) const {
     return T_world_camera_ * Eigen::Vector3d((s - cx_) * z / fx_, (t - cy_) * z / fy_, z);
   }
 
-  /// Is the point between the camera and a measured surface?
+  /// Is the point between the camera and the end of what the pixel has seen to be free?
   bool sees(const Eigen::Vector3d& p_world) const {
     double z;
-    const float d = measured_at(p_world, z);
+    const float d = std::abs(measured_at(p_world, z));
     return d > 0 && z < d;
   }
 
@@ -54,7 +55,10 @@ class ExactView {
     bool clipped;
   };
 
-  /// Depth measured at the pixel a point falls in, 0 where there is none; z: the point's own depth.
+  /// As in DecimatedDepth::depth.
+  float signed_depth(int s, int t) const { return depth_[static_cast<std::size_t>(t) * width_ + s]; }
+
+  /// Signed depth of the pixel that a point falls in, 0 where there is none; z: the point's own depth.
   float measured_at(const Eigen::Vector3d& p_world, double& z) const {
     const Eigen::Vector3d p = T_camera_world_ * p_world;
     z = p.z();
@@ -63,7 +67,7 @@ class ExactView {
     const double s = fx_ * p.x() / z + cx_ + 0.5;
     const double t = fy_ * p.y() / z + cy_ + 0.5;
     if (!(s >= 0 && s < width_ && t >= 0 && t < height_)) return 0;
-    return depth(static_cast<int>(s), static_cast<int>(t));
+    return signed_depth(static_cast<int>(s), static_cast<int>(t));
   }
 
   void make_tiles();
@@ -72,7 +76,7 @@ class ExactView {
   double fx_, fy_, cx_, cy_;  ///< [pixel]
   int width_, height_;        ///< [pixel]
   Eigen::Isometry3d T_camera_world_, T_world_camera_;
-  std::vector<float> depth_;  ///< depth[height][width] [m]; 0: no measurement
+  std::vector<float> depth_;  ///< depth[height][width] [m], as in DecimatedDepth
   bool has_measurements_ = false;
   int tiles_per_row_ = 0;
   std::vector<Bounds> tiles_;

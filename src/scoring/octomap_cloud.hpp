@@ -7,20 +7,26 @@
 
 namespace frontier_surfels::scoring {
 
-/// The measured pixels of a frame, in the world [m].
-inline octomap::Pointcloud to_octomap_cloud(const DepthFrame& frame, const DepthRange& range) {
-  const DecimatedDepth decimated = decimate(frame, range);
+/// What the pixels of a frame have met, in the world [m].
+struct OctomapClouds {
+  octomap::Pointcloud surface;     ///< measured points
+  octomap::Pointcloud free_space;  ///< ends of the rays that have met nothing
+};
+
+inline OctomapClouds to_octomap_clouds(const DepthFrame& frame, const DepthReading& reading) {
+  const DecimatedDepth decimated = decimate(frame, reading);
   const Intrinsics& camera = decimated.intrinsics;
-  octomap::Pointcloud cloud;
+  OctomapClouds clouds;
   for (int t = 0; t < camera.height; ++t) {
     for (int s = 0; s < camera.width; ++s) {
-      const double z = decimated.depth[static_cast<std::size_t>(t) * camera.width + s];
-      if (!(z > 0)) continue;
+      const double d = decimated.depth[static_cast<std::size_t>(t) * camera.width + s], z = std::abs(d);
+      if (d == 0) continue;
       const Eigen::Vector3d p = frame.T_world_camera * Eigen::Vector3d((s - camera.cx) * z / camera.fx, (t - camera.cy) * z / camera.fy, z);
-      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+      (d > 0 ? clouds.surface : clouds.free_space)
+          .push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
     }
   }
-  return cloud;
+  return clouds;
 }
 
 /// Where its rays begin, in the world [m].

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <future>
 
+#include "config/config_text.hpp"
 #include "scoring/cpu_clock.hpp"
 #include "scoring/octomap_cloud.hpp"
 #include "scoring/surfel_tree.hpp"
@@ -79,13 +80,31 @@ std::size_t count_far(const std::vector<Surfel>& surfels, const SurfelTree& tree
                        [&](const Surfel& surfel) { return tree.nearest(surfel.position.cast<double>()).distance > tolerance; });
 }
 
-/// What insertPointCloud takes of the calling thread.
-InsertionTime insert(OcTree& tree, const octomap::Pointcloud& cloud, const octomap::point3d& origin) {
+/// Like insertPointCloud, with rays that end in free space. A voxel is updated once, and occupied ones go first.
+void insert_with_free_rays(OcTree& tree, const OctomapClouds& clouds, const octomap::point3d& origin) {
+  octomap::KeySet free, occupied;
+  tree.computeUpdate(clouds.surface, origin, free, occupied, -1);
+  octomap::KeyRay ray;
+  for (const octomap::point3d& end : clouds.free_space) {
+    if (!tree.computeRayKeys(origin, end, ray)) continue;
+    for (const OcTreeKey& key : ray)
+      if (occupied.count(key) == 0) free.insert(key);
+  }
+  for (const OcTreeKey& key : free) tree.updateNode(key, false);
+  for (const OcTreeKey& key : occupied) tree.updateNode(key, true);
+}
+
+/// What the insertion takes of the calling thread.
+InsertionTime insert(OcTree& tree, const OctomapClouds& clouds, const octomap::point3d& origin) {
   const auto start = std::chrono::steady_clock::now();
   const double cpu_before_ms = cpu_ms(CLOCK_THREAD_CPUTIME_ID);
   // No range limit (the depths have one), no lazy evaluation, no merging of rays: every ray is cast and the tree is pruned at once, as
   // octomap_server does.
-  tree.insertPointCloud(cloud, origin, -1, false, false);
+  if (clouds.free_space.size() == 0) {
+    tree.insertPointCloud(clouds.surface, origin, -1, false, false);
+  } else {
+    insert_with_free_rays(tree, clouds, origin);
+  }
   return {std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
           cpu_ms(CLOCK_THREAD_CPUTIME_ID) - cpu_before_ms};
 }
@@ -94,25 +113,24 @@ InsertionTime insert(OcTree& tree, const octomap::Pointcloud& cloud, const octom
 
 struct OctomapTruth::Impl {
   OcTree tree;
-  DepthRange range;
+  DepthReading reading;
 };
 
-OctomapTruth::OctomapTruth(double resolution, double z_min, double z_max, int decimation) {
+OctomapTruth::OctomapTruth(double resolution, const Config& config) {
   if (!(resolution > 0 && std::isfinite(resolution))) {
-    throw Error("The resolution of the OctoMap must be above 0, but is " + std::to_string(resolution) + " m.");
+    throw Error("The resolution of the OctoMap must be above 0, but is " + to_text(resolution) + " m.");
   }
-  const DepthRange range{z_min, z_max, decimation};
-  range.check();
-  impl_.reset(new Impl{OcTree(resolution), range});
+  const DepthReading reading(config);
+  impl_.reset(new Impl{OcTree(resolution), reading});
 }
 
 OctomapTruth::~OctomapTruth() = default;
 
 InsertionTime OctomapTruth::add(const DepthFrame& frame) {
-  const octomap::Pointcloud cloud = to_octomap_cloud(frame, impl_->range);
+  const OctomapClouds clouds = to_octomap_clouds(frame, impl_->reading);
   // A thread has a heap of its own. In the caller's, every allocation would search the great many small nodes that the tree has freed:
   // the mapper's frames between two insertions took 30 ms longer.
-  return std::async(std::launch::async, [&] { return insert(impl_->tree, cloud, octomap_origin(frame)); }).get();
+  return std::async(std::launch::async, [&] { return insert(impl_->tree, clouds, octomap_origin(frame)); }).get();
 }
 
 std::vector<Surfel> OctomapTruth::boundary() const {
@@ -132,7 +150,7 @@ std::vector<Surfel> OctomapTruth::boundary() const {
     for (int axis = 0; axis < 3; ++axis)
       surfel.position[axis] = static_cast<float>(tree.keyToCoord(static_cast<octomap::key_type>(v[axis])));
     surfel.normal = normal_at(tree, v);
-    surfel.radius = static_cast<float>(std::sqrt(3.0) / 2 * tree.getResolution());
+    surfel.radius = static_cast<float>(kNewRadius * tree.getResolution());
     surfel.label = unknown[i] & 1 ? Label::kOccupied : Label::kFrontier;
     surfel.id = static_cast<std::uint32_t>(surfels.size());
     surfels.push_back(surfel);

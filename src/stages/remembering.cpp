@@ -7,7 +7,8 @@
 
 namespace frontier_surfels {
 
-Remembering::Remembering(Commands& commands) : commands_(commands), blocks_(commands), seen_by_(commands), found_(commands), states_(commands) {}
+Remembering::Remembering(Commands& commands)
+    : commands_(commands), blocks_(commands), seen_by_(commands), found_(commands), states_(commands) {}
 
 std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, const RecentViews& views, double block_size, SeenPoints& seen) {
   const char* stage = "remembering";
@@ -55,8 +56,9 @@ std::vector<BlockKey> Remembering::remember(const ForgottenView& forgotten, cons
   if (asked.empty()) return changed;
   const auto asked_count = static_cast<cl_int>(asked.size());
   seen_by_.send(std::move(asked));
-  commands_.run(stage, "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8), commands_.device().heavy_group(), around.window, view,
-                static_cast<cl_int>(seen.shift()), views.depths(), seen_by_(), asked_count, seen.brick_words());
+  commands_.run(stage, "see_points", static_cast<std::size_t>(asked_count) * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8),
+                commands_.device().heavy_group(), around.window, view, static_cast<cl_int>(seen.shift()), views.depths(), seen_by_(),
+                asked_count, seen.brick_words());
   states_.resize(asked_count);
   commands_.run(stage, "find_brick_states", asked_count, kGroup, seen_by_(), asked_count, seen.brick_words(), states_());
   const std::vector<cl_uchar> states = states_.read(asked_count);

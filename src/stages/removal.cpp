@@ -4,6 +4,7 @@ namespace frontier_surfels {
 
 void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map) {
   const std::size_t pages = map.window_pages();
+  map.back_up("removal", removed, count);
   commands.run("removal", "remove_surfels", pages, kGroup, map.pages(), static_cast<cl_uint>(pages), removed(), map.alive(), map.changed());
   map.removed(count);
 }

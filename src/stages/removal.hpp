@@ -7,7 +7,8 @@
 
 namespace frontier_surfels {
 
-/// Frees the slots of removed surfels. @param removed  SurfelVisit::removed(); @param count  surfels in it
+/// Frees the slots of removed surfels, after a backup of all that the rest of the frame may overwrite.
+/// @param removed  SurfelVisit::removed(); @param count  surfels in it
 void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map);
 
 /// Labels and colours surfels at measured surfaces. It looks at the surfels that are marked as changed: new ones, and those that

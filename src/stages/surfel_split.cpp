@@ -15,6 +15,7 @@ std::size_t SurfelSplit::split(const Frame& frame, const BitField& large, Surfel
   const std::uint32_t children = lists_.scan(stage, offsets_, parents);
   map.reserve(children);
   children_.resize(children);
+  map.back_up(stage, large, parents);
   commands_.run(stage, "split", commands_.chunks(parents), kGroup, frame, map.page_block(), map.surfels(), parents_(), parents, offsets_(),
                 children_.surfels(), children_.cells(), map.alive(), map.changed());
   map.removed(parents);

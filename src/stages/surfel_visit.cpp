@@ -14,6 +14,7 @@ SurfelVisit::Found SurfelVisit::visit(const Frame& frame, const Camera& camera, 
                 column_end(), map.pages(), static_cast<cl_uint>(pages), map.alive(), map.page_block(), map.surfels(), observed(),
                 candidates.bits()(), map.changed(), in_view_(), large_(), removed_(), counts_());
   const std::vector<cl_uint> counts = counts_.read(COUNTS);
+  map.marked(counts[COUNT_LABELLED]);
   return {counts[COUNT_IN_VIEW], counts[COUNT_LARGE], counts[COUNT_REMOVED]};
 }
 

@@ -17,7 +17,7 @@ class ViewSettling {
   /// without candidates have no valid bits.
   const DeviceArray<cl_ushort>& tile_views() const { return tile_views_; }
 
-  /// [tiles of the grid]: how many of the lattice points near the candidates left in a tile were seen before (SEEN_NONE ...); 
+  /// [tiles of the grid]: how many of the lattice points near the candidates left in a tile were seen before (SEEN_NONE ...);
   const DeviceArray<cl_uchar>& tile_seen() const { return tile_seen_; }
 
  private:

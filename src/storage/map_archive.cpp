@@ -41,9 +41,7 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, c
 
 MapArchive::~MapArchive() {
   try {
-    folder_.flush();
-    if (std::vector<StoredBlock> last = read(unsaved()); !last.empty()) folder_.write(std::move(last));
-    folder_.flush();
+    flush(saved_);
   } catch (const std::exception&) {  // what was saved before is still there
   }
 }
@@ -59,12 +57,23 @@ void MapArchive::choose_lattice() {
     }
 }
 
+void MapArchive::flush(std::uint32_t frame) {
+  folder_.flush();
+  map_.roll_back();
+  write(unsaved());
+  saved_ = frame;
+  fault_ = nullptr;
+  next_try_ = 0;
+  folder_.flush();
+}
+
 void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }
 
 bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame) {
   if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
   const double radius = std::max(radius_, reach);
   if (followed_ && (camera - *followed_).norm() < map_.block_size() / 2 && radius <= followed_radius_) return false;
+  followed_.reset();  // if not all blocks come and go, the next frame tries again
   const bool evicted = evict(camera, radius, frame), fetched = fetch(camera, radius, frame);
   followed_ = camera;
   followed_radius_ = radius;
@@ -132,7 +141,12 @@ bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32
 }
 
 void MapArchive::save_some(std::uint32_t frame) {
-  if (frame >= saved_ + kSavePeriod || saved_ == 0) save(unsaved(), frame, frame);
+  if (frame < saved_ + kSavePeriod && saved_ != 0) return;
+  try {
+    save(unsaved(), frame, frame);
+  } catch (const std::exception&) {  // the device failed, and the frame is in the map already
+    fault_ = std::current_exception();
+  }
 }
 
 /// Sorted. Blocks that have become empty are among them.
@@ -148,18 +162,23 @@ MapArchive::Blocks MapArchive::unsaved() const {
 bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame) {
   if (frame < next_try_) return false;
   try {
-    if (std::vector<StoredBlock> stored = read(blocks); !stored.empty()) folder_.write(std::move(stored));
+    write(blocks);
   } catch (const std::exception&) {
     fault_ = std::current_exception();
     next_try_ = frame + kSavePeriod;
     return false;
   }
+  saved_ = mapped;
+  return true;
+}
+
+/// Queues the blocks, and the changes of the kept views, as one transaction.
+void MapArchive::write(const Blocks& blocks) {
+  if (std::vector<StoredBlock> stored = read(blocks); !stored.empty()) folder_.write(std::move(stored));
   noted_.clear();
   old_views_.clear();
   const std::vector<std::uint64_t> kept = views_.numbers();
   saved_views_ = {kept.begin(), kept.end()};
-  saved_ = mapped;
-  return true;
 }
 
 /// Blocks with surfels, or in which something has been seen; sorted.

@@ -18,12 +18,13 @@
 namespace frontier_surfels {
 
 /// Blocks come and go whole, once the camera has moved by half a block. All that has changed since the last time is written in one
-/// transaction, its surfels together with what has been seen there, every so many frames, and before a block of it leaves memory: the folder always holds the map as it was after some frame.
+/// transaction, its surfels together with what has been seen there, every so many frames, and before a block of it leaves memory: the
+/// folder always holds the map as it was after some frame.
 class MapArchive {
  public:
   /// @throws FileError  config.map_folder cannot be used
   MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views);
-  ~MapArchive();  ///< writes what is in memory
+  ~MapArchive();  ///< as flush(), but nobody is told if it fails
 
   /// Are there blocks of an earlier map?
   bool empty() const { return folder_.size() == 0; }
@@ -46,6 +47,13 @@ class MapArchive {
   /// Adds what is on disk only. @throws FileError
   void add_stored(SavedMap& map) const;
 
+  /// Writes all that has changed, and waits for it. @param frame  the last one in the map
+  /// @throws FileError  it could not be written; it stays in memory
+  void flush(std::uint32_t frame);
+
+  /// Why the last save could not be written; empty if all is well. From any thread.
+  std::string fault() const { return folder_.fault(); }
+
   /// Forgets everything on disk.
   void clear();
 
@@ -60,6 +68,7 @@ class MapArchive {
   Blocks in_memory() const;
   std::vector<StoredBlock> read(const Blocks& blocks) const;
   void add_views(std::vector<StoredBlock>& stored) const;
+  void write(const Blocks& blocks);
   bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
 
   SurfelMap& map_;
@@ -72,7 +81,7 @@ class MapArchive {
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
   std::set<std::uint64_t> saved_views_;          ///< numbers of the views on disk
   std::set<std::uint64_t> old_views_;            ///< of those on disk that an earlier process has kept
-  std::set<BlockKey> noted_;                    ///< since the last save
+  std::set<BlockKey> noted_;                     ///< since the last save
   std::exception_ptr fault_;                     ///< of a save that failed
   std::uint32_t saved_ = 0;                      ///< frame of the last save
   std::uint32_t next_try_ = 0;                   ///< frame that may save again

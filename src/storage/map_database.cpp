@@ -5,15 +5,16 @@
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <mutex>
 
+#include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -76,11 +77,7 @@ void create_tables(SQLite::Database& database, double block_size) {
   transaction.commit();
 }
 
-std::string in_metres(double length) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g m", length);
-  return text;
-}
+std::string in_metres(double length) { return to_text(length) + " m"; }
 
 void check_tables(const SQLite::Database& database, const std::string& folder, double block_size) {
   if (number(database, "PRAGMA application_id") != kApplication) {
@@ -135,6 +132,13 @@ SQLite::Statement& restart(SQLite::Statement& statement, BlockKey key) {
   return statement;
 }
 
+/// Numbers of the disk and of the file on it; zeros if there is no file.
+std::pair<std::uint64_t, std::uint64_t> place_of(const std::string& file) {
+  struct stat found = {};
+  if (stat(file.c_str(), &found) != 0) return {0, 0};
+  return {found.st_dev, found.st_ino};
+}
+
 }  // namespace
 
 /// Held until the process ends, however it ends: the kernel lets it go. A file of its own, as SQLite locks and unlocks parts of its.
@@ -181,15 +185,24 @@ struct MapDatabase::Connections {
 };
 
 MapDatabase::MapDatabase(const std::string& folder, double block_size) : folder_(folder), lock_(std::make_unique<Lock>(folder)) {
+  file_ = (std::filesystem::absolute(folder) / "map.sqlite").string();
   try {
-    const auto file = std::filesystem::absolute(folder) / "map.sqlite";
-    connections_ = std::make_unique<Connections>(folder, file.string(), block_size);
+    connections_ = std::make_unique<Connections>(folder, file_, block_size);
+    place_ = place_of(file_);
   } catch (const SQLite::Exception& error) {
     throw explained(folder, error);
   }
 }
 
 MapDatabase::~MapDatabase() = default;
+
+/// SQLite would not notice, and would write into files that nobody finds any more.
+void MapDatabase::check_place() const {
+  if (place_of(file_) == place_) return;
+  throw FileError(named(folder_) +
+                  " has been deleted, moved or replaced while it was in use: put it back, or save the map as a file and start again with "
+                  "another folder.");
+}
 
 void MapDatabase::for_each_block(const std::function<void(BlockKey, std::size_t)>& visit) const {
   const std::lock_guard<std::mutex> lock(connections_->reading);
@@ -205,6 +218,7 @@ void MapDatabase::for_each_block(const std::function<void(BlockKey, std::size_t)
 }
 
 void MapDatabase::write(const std::vector<StoredBlock>& blocks, bool clear) {
+  check_place();
   try {
     SQLite::Transaction transaction(connections_->writer, SQLite::TransactionBehavior::IMMEDIATE);
     if (clear) connections_->writer.exec("DELETE FROM blocks");

@@ -23,6 +23,7 @@ class MapDatabase {
   void for_each_block(const std::function<void(BlockKey, std::size_t)>& visit) const;
 
   /// One transaction: all or nothing. @param clear  erases everything before
+  /// @throws FileError  also if the folder has been deleted, moved or replaced
   void write(const std::vector<StoredBlock>& blocks, bool clear);
 
   /// The bytes of a block that is there. @throws FileError  also if they are not those that were written
@@ -31,7 +32,10 @@ class MapDatabase {
  private:
   class Lock;
   struct Connections;
-  std::string folder_;
+  void check_place() const;
+
+  std::string folder_, file_;
+  std::pair<std::uint64_t, std::uint64_t> place_;  ///< of file_ when it was opened: numbers of the disk and of the file on it
   std::unique_ptr<Lock> lock_;
   std::unique_ptr<Connections> connections_;
 };

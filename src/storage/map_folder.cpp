@@ -83,20 +83,28 @@ std::vector<std::uint8_t> MapFolder::read(BlockKey key) const {
 
 void MapFolder::flush() {
   std::unique_lock<std::mutex> lock(mutex_);
-  failure_.clear();  // what matters is whether it can be written now
+  failure_.clear();                             // what matters is whether it can be written now
+  if (queue_.empty()) enqueue({{}, false, 0});  // and whether the folder is still there
   changed_.notify_all();
   changed_.wait(lock, [&] { return !failure_.empty() || queue_.empty(); });
   throw_failure();
+}
+
+std::string MapFolder::fault() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return fault_;
 }
 
 void MapFolder::clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
   queue_.erase(std::next(queue_.begin(), writing_ ? 1 : 0), queue_.end());
   queued_bytes_ = writing_ ? queue_.front().bytes : 0;
+  if (writing_) queue_.front().obsolete = true;
   queued_.clear();
   sizes_.clear();
   bytes_ = 0;
   failure_.clear();
+  fault_.clear();
   enqueue({{}, true, 0});
 }
 
@@ -143,7 +151,8 @@ void MapFolder::write_queued() {
     }
     lock.lock();
     writing_ = false;
-    failure_ = failure;
+    if (batch.obsolete) failure.clear();
+    failure_ = fault_ = failure;
     if (failure.empty()) written();
     changed_.notify_all();
   }

@@ -45,8 +45,11 @@ class MapFolder {
   /// The newest bytes of a block, be they queued or written; none if there is no such block. @throws FileError  the block is damaged
   std::vector<std::uint8_t> read(BlockKey key) const;
 
-  /// Waits until all is written. @throws FileError  it could not be; all that is missing stays queued
+  /// Waits until all is written. @throws FileError  it could not be, or the folder is gone; all that is missing stays queued
   void flush();
+
+  /// Why what is queued could not be written at the last try; empty if all is well. From any thread.
+  std::string fault() const;
 
   /// Erases all blocks, and forgets what could not be written.
   void clear();
@@ -54,8 +57,9 @@ class MapFolder {
  private:
   struct Batch {
     std::vector<StoredBlock> blocks;
-    bool clear;         ///< erases everything before
-    std::size_t bytes;  ///< in memory
+    bool clear;             ///< erases everything before
+    std::size_t bytes;      ///< in memory
+    bool obsolete = false;  ///< everything has been erased since; its writing may fail
   };
   void enqueue(Batch&& batch);
   void index(const StoredBlock& block);
@@ -73,6 +77,7 @@ class MapFolder {
   std::size_t queued_bytes_ = 0;
   bool writing_ = false;  ///< the first of queue_
   std::string failure_;   ///< why the first of queue_ could not be written; nothing is written until it was told
+  std::string fault_;     ///< the same, until it is written
   bool stopping_ = false;
   std::thread thread_;
 };

@@ -14,8 +14,8 @@ struct StoredParts {
   std::vector<std::uint8_t> surfels, seen;
 };
 
-/// The bytes of a block: the shift and the number of bytes of the surfels (uint32 each), the surfels, and then what has been seen. None if there
-/// are neither surfels nor seen points.
+/// The bytes of a block: the shift and the number of bytes of the surfels (uint32 each), the surfels, and then what has been seen. None if
+/// there are neither surfels nor seen points.
 std::vector<std::uint8_t> join(const StoredParts& parts);
 
 /// @throws FileError  the bytes end too early

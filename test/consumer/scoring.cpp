@@ -5,8 +5,9 @@
 #include "wall.hpp"
 
 int main() {
-  const frontier_surfels::Config config;
-  frontier_surfels::scoring::ExactTest test(config.z_min, config.z_max, 1);
+  frontier_surfels::Config config;
+  config.decimation = 1;
+  frontier_surfels::scoring::ExactTest test(config);
   test.add(Wall().frame);
   return test.known({0, 0, 1}) && !test.known({0, 0, 1.6}) ? 0 : 1;
 }

@@ -11,12 +11,14 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "recordings/frame_source.hpp"
+#include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -76,6 +78,20 @@ inline sensor_msgs::Image depth_message(double stamp, std::uint16_t value = 1500
   return image;
 }
 
+/// Depth of 32FC1 with this quantisation.
+inline sensor_msgs::CompressedImage compressed_depth(double stamp, float a, float b) {
+  const messages::CompressedDepthHeader header = {0, {a, b}};
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(100)), png);
+  sensor_msgs::CompressedImage message;
+  message.header = depth_message(stamp).header;
+  message.format = "32FC1; compressedDepth";
+  message.data.resize(sizeof(header));
+  std::memcpy(message.data.data(), &header, sizeof(header));
+  message.data.insert(message.data.end(), png.begin(), png.end());
+  return message;
+}
+
 inline sensor_msgs::Image color_message(double stamp, const std::string& encoding, const std::vector<std::uint8_t>& pixel) {
   sensor_msgs::Image image = depth_message(stamp);
   image.encoding = encoding;
@@ -108,13 +124,23 @@ inline tf2_msgs::TFMessage tf_message(double stamp, const std::string& parent, c
 /// Writes messages, at any time.
 class Handmade {
  public:
-  explicit Handmade(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
+  explicit Handmade(const std::string& path, rosbag::CompressionType compression = rosbag::compression::Uncompressed) {
+    bag_.open(path, rosbag::bagmode::Write);
+    bag_.setCompression(compression);
+  }
 
   template <typename Message>
   Handmade& add(const std::string& topic, double time, const Message& message) {
-    bag_.write(topic, ros::Time(time), message);
+    return add_at(topic, ros::Time(time), message);
+  }
+
+  template <typename Message>
+  Handmade& add_at(const std::string& topic, const ros::Time& time, const Message& message) {
+    bag_.write(topic, time, message);
     return *this;
   }
+
+  void close() { bag_.close(); }
 
   /// A message of the first version of tf, which is the same except for the name of its type.
   Handmade& add_of_old_type(const std::string& topic, double time, const tf2_msgs::TFMessage& message) {

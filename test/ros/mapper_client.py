@@ -156,6 +156,16 @@ class Mapper:
     def surfels(self):
         return self.map()[1]
 
+    def parts(self, most):
+        """The surfels in parts of at most this number."""
+        request = GetSurfelsRequest(most=most)
+        while True:
+            response = self.call('get_surfels', GetSurfels, request)
+            yield to_array(response.surfels)
+            request.first_id = response.next_id
+            if request.first_id == 0:
+                return
+
     def wait_until_connected(self, *publishers):
         """Waits until every publisher is connected to this mapper, and the mapper to this node."""
         wait_until(lambda: self.subscriber.get_num_connections() > 0, what=f'the reports of {self.name}')

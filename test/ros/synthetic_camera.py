@@ -6,7 +6,7 @@ import numpy
 import rospy
 from PIL import Image as Picture
 from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 
 ROOM = ((-3.0, -2.5, 0.0), (2.5, 2.5, 2.6))  # two corners; the camera is inside [m]
 BOXES = [((0.9, -0.6, 0.0), (1.5, 0.4, 0.9)), ((0.2, 0.7, 0.0), (0.8, 1.3, 1.6)), ((1.6, 0.9, 0.4), (2.2, 1.5, 1.1))]
@@ -19,11 +19,13 @@ class Camera:
     def __init__(self, width=320, height=240):
         self.width, self.height = width, height
         self.f, self.cx, self.cy = width * 0.85, (width - 1) / 2, (height - 1) / 2
+        self.distortion, self.roi = None, RegionOfInterest()
 
     def info(self, header):
-        return CameraInfo(header=header, width=self.width, height=self.height, distortion_model='plumb_bob', D=[0.0] * 5,
-                          K=[self.f, 0, self.cx, 0, self.f, self.cy, 0, 0, 1], R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
-                          P=[self.f, 0, self.cx, 0, 0, self.f, self.cy, 0, 0, 0, 1, 0])
+        """With distortion, it has no P, as of a camera that is not rectified."""
+        P = [0] * 12 if self.distortion else [self.f, 0, self.cx, 0, 0, self.f, self.cy, 0, 0, 0, 1, 0]
+        return CameraInfo(header=header, width=self.width, height=self.height, distortion_model='plumb_bob', D=self.distortion or [0.0] * 5,
+                          K=[self.f, 0, self.cx, 0, self.f, self.cy, 0, 0, 1], R=[1, 0, 0, 0, 1, 0, 0, 0, 1], P=P, roi=self.roi)
 
     def depth(self, step):
         """The depth image at a step of the walk: millimetres as uint16."""

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
+#include <fstream>
 
+#include "file_size_limit.hpp"
 #include "recordings/bag_writer.hpp"
 #include "ros/bag_input.hpp"
 #include "synthetic/synthetic_room.hpp"
@@ -63,6 +66,25 @@ class RoundTrip : public BagTest {
   }
 };
 
+TEST_F(RoundTrip, AFullDiskIsASentenceAndLeavesNoBag) {
+  std::ofstream(path_) << "an earlier bag";
+  std::signal(SIGXFSZ, SIG_IGN);
+  for (const rlim_t size : {0, 1000, 5000, 20000, 60000}) {
+    RoomSource source(room_frames());
+    std::string said;
+    limit_file_size(true, size);
+    try {
+      write_bag(source, path_);
+    } catch (const FileError& error) {
+      said = error.what();
+    }
+    limit_file_size(false);
+    EXPECT_NE(said.find("has space"), std::string::npos) << "at " << size << " bytes: " << said;
+    EXPECT_FALSE(fs::exists(path_ + ".active"));
+    EXPECT_EQ(fs::file_size(path_), 14u) << "the earlier bag is gone";
+  }
+}
+
 TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   const std::vector<RecordedFrame> written = room_frames();
   BagOptions options;
@@ -79,7 +101,8 @@ TEST_F(RoundTrip, SixteenBitsComeBackAsTheyWere) {
   }
 }
 
-/// The mapper computes float(mm) / 1000. Maps are the same bit for bit only if the bag contains exactly these floats.
+/// The mapper computes float(0.001 mm), which is the nearest float to mm / 1000. Maps are the same bit for bit only if the bag contains
+/// exactly these floats.
 TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
   const std::vector<RecordedFrame> written = room_frames(), read = write_and_read({});
   ASSERT_EQ(read.size(), written.size());
@@ -101,6 +124,38 @@ TEST_F(RoundTrip, MetresAreThoseOfTheMillimetres) {
     }
   }
   EXPECT_GT(measured, 10000u);
+}
+
+/// Numbers that are no measurement are none in the bag, and the others are depths in the recording's unit.
+TEST_F(RoundTrip, SixteenBitsInAnotherUnit) {
+  std::vector<RecordedFrame> written = room_frames();
+  for (RecordedFrame& frame : written) {
+    frame.depth = frame.depth * 4;
+    frame.depth.at<std::uint16_t>(0, 0) = 65535;
+    frame.depth.at<std::uint16_t>(0, 1) = 7001;
+  }
+  BagOptions options;
+  options.depth_unit = 0.00025;
+  for (const char* encoding : {"16UC1", "32FC1"}) {
+    options.encoding = encoding;
+    RoomSource source(written);
+    write_bag(source, path_, options);
+    const std::vector<RecordedFrame> read = read_all(*open_source(path_));
+    ASSERT_EQ(read.size(), written.size());
+    const cv::Mat& depth = read.back().depth;
+    const bool metres = depth.type() == CV_32FC1;
+    EXPECT_EQ(metres, std::string(encoding) == "32FC1");
+    if (metres) {
+      EXPECT_TRUE(std::isnan(depth.at<float>(0, 0)));
+      EXPECT_EQ(depth.at<float>(0, 1), 1.75025F);
+    } else {
+      EXPECT_EQ(depth.at<std::uint16_t>(0, 0), 0);
+      EXPECT_EQ(depth.at<std::uint16_t>(0, 1), 1750);
+    }
+  }
+  options.depth_unit = 0;
+  RoomSource source(written);
+  EXPECT_THROW(write_bag(source, path_, options), Error);
 }
 
 TEST_F(RoundTrip, CompressedSixteenBits) {

@@ -86,6 +86,78 @@ TEST_F(BagTest, DamagedTransformsAreLeftOut) {
   EXPECT_TRUE(says(source->notes().front(), "2 transforms"));
 }
 
+/// The largest time, which some drivers write for "no time".
+ros::Time no_time() { return ros::Time(4294967295, 999999999); }
+
+TEST_F(BagTest, TransformsWithoutATimeAreLeftOut) {
+  tf2_msgs::TFMessage moving = tf_message(10.5, "world", "camera", 7), other = tf_message(10.5, "world", "robot", 7);
+  moving.transforms[0].header.stamp = other.transforms[0].header.stamp = no_time();
+  for (const double time : {9.0, 10.5, 12.0}) {  // before, between and after the others
+    Handmade bag(path_);
+    if (time < 10) bag.add("/tf", time, moving);
+    bag.add_camera_and_motion().add("/tf", 10.2, other);
+    if (time > 10) bag.add("/tf", time, moving);
+    bag.add("/tf", 12.5, tf_message(12, "world", "camera", 2)).add("/depth/image", 10.5, depth_message(10.5));
+    bag.add("/depth/image", 11.5, depth_message(11.5)).close();
+    const auto source = open_source(path_);
+    const auto frames = read_all(*source);
+    ASSERT_EQ(frames.size(), 2u) << source->skipped().front();
+    EXPECT_NEAR(frames[0].T_world_camera.translation().x(), 0.5, 1e-9);
+    EXPECT_NEAR(frames[1].T_world_camera.translation().x(), 1.5, 1e-9);
+    EXPECT_TRUE(says(source->notes().front(), "2 transforms"));
+    EXPECT_TRUE(says(source->notes().front(), "2038"));
+  }
+}
+
+TEST_F(BagTest, OtherMessagesWithoutATimeDoNoHarm) {
+  sensor_msgs::Image depth = depth_message(10.5), color = color_message(10.5, "bgr8", {1, 2, 3});
+  sensor_msgs::CameraInfo info = info_message(10);
+  depth.header.stamp = color.header.stamp = info.header.stamp = no_time();
+  tf2_msgs::TFMessage fixed = tf_message(10, "base", "camera", 0);
+  fixed.transforms[0].header.stamp = no_time();
+  Handmade bag(path_);
+  bag.add("/depth/image", 10.4, depth).add("/rgb/image", 10.4, color).add("/depth/camera_info", 10.4, info);
+  bag.add("/depth/image", 10.5, depth_message(10.5)).add("/rgb/image", 10.5, color_message(10.5, "bgr8", {4, 5, 6}));
+  bag.add("/depth/camera_info", 10, info_message(10));
+  bag.add("/tf", 10, tf_message(10, "world", "base", 0)).add("/tf", 11, tf_message(11, "world", "base", 1)).add("/tf_static", 10, fixed);
+  bag.add_at("/tf", no_time(), tf_message(11.5, "world", "base", 3)).add_at("/depth/image", no_time(), depth_message(11.25)).close();
+  const auto source = open_source(path_);
+  const auto frames = read_all(*source);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_NEAR(frames[0].T_world_camera.translation().x(), 0.5, 1e-9);
+  EXPECT_NEAR(frames[1].T_world_camera.translation().x(), 2, 1e-9);
+  EXPECT_FALSE(frames[0].color.empty());
+  ASSERT_EQ(source->skipped().size(), 1u);
+  EXPECT_TRUE(says(source->skipped()[0], "4294967295 s is later than in 2038"));
+}
+
+TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}}) {
+    Handmade(path_).add_camera_and_motion().add("/depth/image/compressedDepth", 10, compressed_depth(10, a, b));
+    EXPECT_TRUE(says(failure(), "/depth/image/compressedDepth cannot be used: its depth quantisation"));
+    Handmade(path_)
+        .add_camera_and_motion()
+        .add("/depth/image/compressedDepth", 10, compressed_depth(10, 100, 0))
+        .add("/depth/image/compressedDepth", 10.5, compressed_depth(10.5, a, b));
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 1u);
+    ASSERT_EQ(source->skipped().size(), 1u);
+    EXPECT_TRUE(says(source->skipped()[0], "quantisation"));
+  }
+}
+
+TEST_F(BagTest, AStillCameraGetsAListOfTheTransforms) {
+  Handmade(path_)
+      .add("/depth/camera_info", 10, info_message(10))
+      .add("/tf_static", 10, tf_message(10, "base", "camera", 1))
+      .add("/tf", 10, tf_message(10, "map", "odom", 1))
+      .add("/depth/image", 10, depth_message(10));
+  const auto source = open_source(path_);
+  EXPECT_EQ(source->world_frame(), "base");
+  EXPECT_TRUE(says(source->if_still(), "map -> odom"));
+}
+
 TEST_F(BagTest, CameraInfoMayChangeAndMustBeThere) {
   Handmade(path_)
       .add_camera_and_motion()

@@ -62,6 +62,32 @@ TEST_F(BagStreams, TransformsComeInOneMessageByTheTimeOfTheBag) {
   EXPECT_EQ(stamps_of(constant.take(ros::TIME_MAX)), (Stamps{1}));
 }
 
+TEST_F(BagStreams, MessagesWithoutATimeAreLeftOut) {
+  const ros::Time no_time(4294967295, 999999999);
+  sensor_msgs::Image color = color_message(10, "rgb8", {1, 2, 3});
+  sensor_msgs::CameraInfo info = info_message(10);
+  tf2_msgs::TFMessage transform = tf_message(10, "a", "b", 0);
+  color.header.stamp = info.header.stamp = transform.transforms[0].header.stamp = no_time;
+  Handmade(path_)
+      .add("/info", 10, info_message(10))
+      .add("/info", 10.1, info)
+      .add("/info", 10.2, info_message(10.2))
+      .add("/rgb", 10, color)
+      .add("/rgb", 10.2, color_message(10.2, "rgb8", {1, 2, 3}))
+      .add("/tf", 10, transform)
+      .add("/tf", 10.2, tf_message(10.2, "a", "b", 0))
+      .add("/tf_static", 10, transform)
+      .close();
+  CameraStream cameras(bag(), "/info");
+  EXPECT_EQ(take(cameras, 10), 10);
+  EXPECT_EQ(take(cameras, 11), 10.2);
+  ColorStream colors(bag(), "/rgb");
+  EXPECT_EQ(take(colors, 10.1), (Stamps{10.2}));
+  TransformStream moving(bag(), "tf"), constant(bag(), "tf_static");
+  EXPECT_EQ(stamps_of(moving.take(ros::TIME_MAX)), (Stamps{10.2}));
+  EXPECT_EQ(constant.take(ros::TIME_MAX).transforms.size(), 1u) << "the stamp of a static transform has no meaning";
+}
+
 TEST_F(BagStreams, RotationsThatAreNearlyOnesAreCorrectedAsOffline) {
   tf2_msgs::TFMessage nearly = tf_message(10, "a", "b", 0), damaged = nearly;
   nearly.transforms[0].transform.rotation.w = 1.005;

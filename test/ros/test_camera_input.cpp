@@ -155,6 +155,17 @@ TEST_F(CameraInputs, SayWhatWasMissing) {
   EXPECT_EQ(camera.ready, 0);
 }
 
+TEST_F(CameraInputs, DropAtOnceWhatCanNeverHaveAPose) {
+  TestCamera camera(poses_, "left");
+  camera.add(image_of("", 10));
+  camera.add(image_of("/", 10));
+  ASSERT_EQ(camera.dropped.size(), 2U);
+  for (const DroppedImage& image : camera.dropped) {
+    EXPECT_EQ(image.result, FrameReport::DROPPED_NO_POSE);
+    EXPECT_NE(image.reason.find("frame_id is empty"), std::string::npos) << image.reason;
+  }
+}
+
 TEST_F(CameraInputs, WaitForColourThatIsDue) {
   TestCamera camera(poses_, "left");
   camera.add_info(info_message(10));

@@ -71,7 +71,7 @@ TEST(DepthMessages, AreViewedWhereTheyLie) {
     EXPECT_EQ(pixels.view.width, kWidth);
     EXPECT_EQ(pixels.view.height, kHeight);
     EXPECT_EQ(pixels.view.step, image.step);
-    EXPECT_EQ(pixels.view.encoding, DepthImage::Encoding::kMillimetresU16);
+    EXPECT_EQ(pixels.view.encoding, DepthImage::Encoding::kStepsU16);
     EXPECT_EQ(pixels.view.swap_bytes, big_endian) << "this test is for little-endian machines";
     EXPECT_EQ(message.raw.use_count(), 2) << "the pixels keep the message alive";
   }
@@ -147,6 +147,16 @@ TEST(ColourMessages, OfFourOrdersAreViewedWhereTheyLie) {
   }
 }
 
+TEST(DepthMessages, ImpossibleQuantisationIsRefused) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto pixels_of = [](float a, float b) {
+    return depth_pixels({nullptr, boost::make_shared<sensor_msgs::CompressedImage>(compressed_depth(1, a, b))});
+  };
+  EXPECT_EQ(pixels_of(100, 0).view.width, kWidth);
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}})
+    EXPECT_THROW(pixels_of(a, b), BadFrame) << a << " " << b;
+}
+
 TEST(ColourMessages, AreRefusedWhenTheyAreCutShort) {
   for (const char* encoding : {"rgb8", "bgra8", "mono8"}) {
     sensor_msgs::Image image = color_message(1, encoding, {1, 2, 3, 4});
@@ -179,6 +189,22 @@ TEST(CameraMessages, RectifiedBinnedAndCropped) {
   EXPECT_EQ(intrinsics.cy, 100);
   EXPECT_EQ(intrinsics.width, 100);
   EXPECT_EQ(intrinsics.height, 100);
+
+  info.roi.x_offset = 240;
+  EXPECT_EQ(to_intrinsics(info).width, 100) << "at the edge of the sensor";
+  for (const auto& [x, y, width, height] : {std::array{241U, 40U, 400U, 200U},
+                                            {0, 0, 641, 480},
+                                            {0, 281, 400, 200},
+                                            {0, 0, 400, 0},
+                                            {700, 0, 10, 10},
+                                            {4294967295U, 0, 2, 2}}) {
+    sensor_msgs::CameraInfo outside = info;
+    outside.roi.x_offset = x;
+    outside.roi.y_offset = y;
+    outside.roi.width = width;
+    outside.roi.height = height;
+    EXPECT_THROW(to_intrinsics(outside), BadFrame) << x << " " << y << " " << width << " " << height;
+  }
 
   info.P[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(to_intrinsics(info), BadFrame);

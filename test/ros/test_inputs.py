@@ -5,7 +5,7 @@ import time
 import numpy
 import rospy
 from frontier_surfels.msg import FrameReport
-from sensor_msgs.msg import Image, PointCloud2
+from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
 
 from mapper_client import Mapper, MapperTest, case, has_color, run, to_array, wait_until
 from synthetic_camera import Camera, compressed_depth, header_of, metres, pose, raw_image
@@ -88,7 +88,13 @@ class Inputs(MapperTest):
             report = self.mapper.report(self.camera.send(2, message=message))
             self.assertIn(report.result, (FrameReport.INTEGRATED, FrameReport.DROPPED_BAD_IMAGE), report.reason)
             self.assertEqual(report.surfels, len(before), f'after an image of {value}')
-        self.check_integrated(self.camera.send(2, message=raw_image(numpy.zeros(shape, dtype=numpy.uint16), '16UC1', None)))
+            self.assertRegex(report.reason, r'^The depth image .*: .*\.$')
+        for value, reason in ((0, 'no measurement in any pixel'), (65535, '65535 in every pixel'), (20000, 'correct depth_unit')):
+            report = self.mapper.report(self.camera.send(2, message=raw_image(numpy.full(shape, value, dtype=numpy.uint16), '16UC1', None)))
+            self.assertEqual(report.result, FrameReport.INTEGRATED)
+            self.assertRegex(report.reason, reason)
+        report = self.mapper.report(self.camera.send(2, message=raw_image(1000 * metres(self.camera.camera.depth(2)), '32FC1', None)))
+        self.assertRegex(report.reason, 'look like millimetres')
         self.assert_same_but_ids(before, self.mapper.surfels())
 
     def test_no_camera_info(self):
@@ -107,6 +113,30 @@ class Inputs(MapperTest):
         image = raw_image(Camera(160, 120).depth(0), '16UC1', None)
         self.check_dropped(self.camera.send(0, message=image), FrameReport.DROPPED_NO_CAMERA, '160x120.*320x240')
         self.check_integrated(self.camera.send(1))
+
+    def test_camera_alternates_its_size(self):
+        """As if two cameras published on one topic. It is told once; each image is mapped with its own camera."""
+        reasons = []
+        for step in range(8):
+            self.camera.camera = Camera(320, 240) if step % 2 else Camera(160, 120)
+            report = self.mapper.report(self.camera.send(step))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+            reasons.append(report.reason)
+        self.assertRegex(reasons[3], '160x120 and of 320x240 pixels alternate.*topics of one camera')
+        self.assertEqual(set(reasons[:3] + reasons[4:]), {''})
+
+    def test_regions_outside_the_sensor(self):
+        for region in (RegionOfInterest(width=400, height=240), RegionOfInterest(x_offset=200, width=160, height=120)):
+            self.camera.camera = Camera()
+            self.camera.camera.roi = region
+            size = (region.height, region.width)
+            image = raw_image(numpy.full(size, 1500, dtype=numpy.uint16), '16UC1', None)
+            self.check_dropped(self.camera.send(0, message=image), FrameReport.DROPPED_NO_CAMERA, 'not within the sensor of 320x240')
+
+    def test_distortion_without_p(self):
+        self.camera.camera.distortion = [0.1, -0.2, 0.0, 0.0, 0.0]
+        reasons = [self.mapper.report(self.camera.send(step)).reason for step in range(4)]  # the first image may overtake its camera_info
+        self.assertRegex(''.join(reasons), '^The camera_info has distortion, but no P: [^:]*taken as rectified[^:]*$')
 
     def test_camera_info_a_little_later_than_its_image(self):
         self.check_integrated(self.camera.send(0))

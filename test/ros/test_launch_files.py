@@ -77,9 +77,31 @@ class LaunchFiles(unittest.TestCase):
         self.assertTrue(self.parameters('realsense.launch')['/mapper/use_color'])
         self.assertFalse(self.parameters('openni.launch', 'color:=false')['/mapper/use_color'])
 
-    def launch(self, name, *arguments):
-        return subprocess.run(['roslaunch', 'frontier_surfels', name, 'bag:=' + self.bag, 'rviz:=false', *arguments], capture_output=True,
-                              text=True, timeout=90)
+    def launch(self, name, *arguments, bag=None):
+        return subprocess.run(['roslaunch', 'frontier_surfels', name, 'bag:=' + (bag or self.bag), 'rviz:=false', *arguments],
+                              capture_output=True, text=True, timeout=90)
+
+    def in_home(self):
+        """A folder in the home folder, and the same with `~`, which no shell expands in the arguments of launch files."""
+        home = tempfile.mkdtemp(dir=os.path.expanduser('~'), prefix="it's ")
+        self.addCleanup(shutil.rmtree, home)
+        return home, os.path.join('~', os.path.basename(home))
+
+    def test_paths_may_begin_with_a_tilde_and_have_quotes(self):
+        home, tilde = self.in_home()
+        shutil.copy(self.bag, os.path.join(home, 'room.bag'))
+        with open(os.path.join(home, 'my.yaml'), 'w', encoding='utf-8') as file:
+            file.write('recent_views: 3\nmessage_limit: 1000\n')  # the map of replay.launch then comes in parts
+        self.assertEqual(self.parameters('mapper.launch', f'config:={tilde}/my.yaml')['/mapper/recent_views'], 3)
+        result = self.launch('replay.launch', f'report:={tilde}/report', f'config:={tilde}/my.yaml', 'options:=--octomap-resolution 0 --no-exact',
+                             bag=f'{tilde}/room.bag')
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertTrue(os.path.exists(os.path.join(home, 'report', 'report.html')))
+        mapper = Mapper('mapper')
+        self.addCleanup(mapper.subscriber.unregister)
+        result = self.launch('tum.launch', bag=f'{tilde}/room.bag')
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertEqual(len(mapper.reports), FRAMES)
 
     def test_tum_bag(self):
         mapper = Mapper('mapper')
@@ -100,6 +122,17 @@ class LaunchFiles(unittest.TestCase):
         self.assertEqual(summary['input']['frames'], FRAMES)
         self.assertGreater(summary['surfels']['total'], 1000)
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
+
+    def test_live_replay_leaves_map_folders_alone(self):
+        kept = os.path.join(self.folder, 'kept')
+        mapper = subprocess.Popen([program('mapper_node'), '__name:=keeping', '_map_folder:=' + kept])
+        self.addCleanup(mapper.wait)
+        self.addCleanup(mapper.kill)
+        report = os.path.join(self.folder, 'no report')
+        result = subprocess.run([program('replay_score'), self.bag, '--live', '--mapper', 'keeping', '--report', report], capture_output=True,
+                                text=True, timeout=60)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertRegex(result.stderr, 'keeping.*' + kept + '.*without map_folder')
 
 
 if __name__ == '__main__':

@@ -1,29 +1,38 @@
 #!/usr/bin/python3
 """The node as a process: how it starts, what it refuses, how it ends."""
+import os
+import re
+import shutil
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
 
 import rospy
-from frontier_surfels.msg import FrameReport
+from diagnostic_msgs.msg import DiagnosticArray
+from frontier_surfels.msg import FrameReport, SurfelUpdate
 from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
-from mapper_client import TIMEOUT, CameraTopics, Mapper, run, wait_until
-from synthetic_camera import Camera
+from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
+from synthetic_camera import Camera, compressed_depth, pose, transform
 
-REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info']
+REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info',
+              'color/image:=camera/color/image']
 
 
 class Processes(unittest.TestCase):
-    def start(self, name, **parameters):
+    def start(self, name, environment=None, **parameters):
         """Starts a mapper as a process of this test."""
         program = find_node('frontier_surfels', 'mapper_node')[0]
         arguments = [f'__name:={name}', *REMAPPINGS, *(f'_{key}:={value}' for key, value in parameters.items())]
         self.addCleanup(lambda: rospy.has_param(name) and rospy.delete_param(name))
-        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        process = subprocess.Popen([program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                   env={**os.environ, **(environment or {})})
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -44,7 +53,42 @@ class Processes(unittest.TestCase):
         self.check_refused('no-such-platform', platform='no-such-platform')
 
     def test_no_such_transport(self):
-        self.check_refused('carrier_pigeon.*install', image_transport='carrier_pigeon')
+        self.check_refused("~image_transport is 'carrier_pigeon'.*install.*raw", image_transport='carrier_pigeon')
+        self.check_refused("~color_transport is 'carrier_pigeon'.*install.*raw", color_transport='carrier_pigeon')
+        self.check_refused('color_transport is compressedDepth.*raw or compressed', color_transport='compressedDepth')
+
+    def test_colour_has_a_transport_of_its_own(self):
+        camera, mapper = CameraTopics(), Mapper('packed')
+        self.start('packed', image_transport='compressedDepth')
+        mapper.wait_until_connected(camera.compressed, camera.color, camera.info, camera.tf)
+        for step in range(10):  # on a busy machine a colour image may come too late for its depth image
+            message = compressed_depth(camera.camera.depth(step), None)
+            report = mapper.report(camera.send(step, message=message, color=camera.camera.color()))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+            if has_color(mapper.surfels()).any():
+                return
+        self.fail('No surfel has a colour.')
+
+    def test_transforms_that_cannot_be_used(self):
+        """They end nothing, and one line is printed about them, not two by tf for each."""
+        camera, mapper = CameraTopics(), Mapper('unmoved')
+        process = self.start('unmoved')
+        mapper.wait_until_connected(*camera.raw())
+        last = rospy.Time(4294967295, 999999999)
+        for step in range(3):
+            stamp = rospy.Time.now()
+            for parent, child, time_of in (('map', camera.frame, last), ('map', '', stamp), ('', camera.frame, stamp), ('map', 'map', stamp)):
+                for _ in range(5):
+                    camera.tf.publish(TFMessage([transform(pose(step), parent, child, time_of)]))
+            report = mapper.report(camera.send(step))
+            self.assertEqual(report.result, FrameReport.INTEGRATED, report.reason)
+        report = mapper.report(camera.send(3, stamp=last, send_pose=False))
+        self.assertEqual(report.result, FrameReport.DROPPED_NO_POSE, report.reason)
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        self.assertEqual(len(re.findall('A transform.*is not used.*stamp of 4294967295.*test_processes', output)), 1, output)
+        self.assertLess(len(output.splitlines()), 10, output)
 
     def test_unknown_parameters_are_warned_of(self):
         process = self.start('warned', z_maximum=4.0, decimatoin=2)
@@ -54,6 +98,81 @@ class Processes(unittest.TestCase):
         self.assertEqual(process.returncode, 0, output)
         self.assertRegex(output, '~z_maximum')
         self.assertRegex(output, '~decimatoin.*decimation')
+
+    def test_parameters_in_force_are_on_the_parameter_server(self):
+        self.start('told', z_max=2.5)
+        Mapper('told').wait_until_connected()
+        parameters = rospy.get_param('told')
+        self.assertEqual((parameters['z_max'], parameters['z_min'], parameters['world_frame'], parameters['marker_limit']),
+                         (2.5, 0.5, 'map', 100000))
+        self.assertEqual((parameters['remove_buried'], parameters['map_folder']), (True, ''))
+
+    def test_the_map_folder_may_begin_with_a_tilde(self):
+        home = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, home)
+        process = self.start('homely', {'HOME': home}, map_folder='~/map')
+        Mapper('homely').wait_until_connected()
+        self.assertEqual(rospy.get_param('homely/map_folder'), os.path.join(home, 'map'))
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertIn(os.path.join(home, 'map') + '.', output)
+        self.assertIn('map.sqlite', os.listdir(os.path.join(home, 'map')))
+
+    def test_a_deleted_map_folder_is_told_at_once_and_at_the_end(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        camera, mapper = CameraTopics(), Mapper('bereft')
+        process = self.start('bereft', map_folder=os.path.join(folder, 'map'))
+        mapper.wait_until_connected(*camera.raw())
+        shutil.rmtree(os.path.join(folder, 'map'))
+        self.assertEqual(mapper.report(camera.send(0)).result, FrameReport.INTEGRATED)
+        told = []
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: told.extend(
+            status.message for status in message.status if 'bereft' in status.name and status.level == 2))
+        self.addCleanup(subscriber.unregister)
+        sentence = 'has been deleted, moved or replaced'
+        wait_until(lambda: any(sentence in message for message in told), what='the fault in /diagnostics')
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 1, output)
+        self.assertRegex(output, f'ERROR.*: The map folder .* {sentence}')
+        self.assertRegex(output, f'FATAL. The end of the map is lost. The map folder .* {sentence}')
+
+    def test_a_loaded_map_is_shown_before_the_first_frame(self):
+        """/diagnostics counts it, and its clouds, markers and updates are stamped with now."""
+        camera, source = CameraTopics(), Mapper('source')
+        self.start('source')
+        source.wait_until_connected(*camera.raw())
+        surfels = source.report(camera.send(0)).surfels
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'map.ply')
+        self.assertTrue(source.save(path).success)
+        stamps, counted = {}, []
+        self.start('shown')
+        shown = Mapper('shown')
+        shown.wait_until_connected()
+        start = rospy.Time.now()
+        self.assertTrue(shown.load(path).success)
+
+        def see(topic, kind, stamp_of):
+            subscriber = rospy.Subscriber(topic, kind, lambda message: stamps.setdefault(topic, stamp_of(message)))
+            self.addCleanup(subscriber.unregister)
+
+        def read(array):
+            counted.extend(entry.value for status in array.status if status.name.startswith('shown') for entry in status.values
+                           if entry.key == 'surfels')
+
+        for topic in ('shown/surfels', 'shown/occupied', 'shown/frontier'):
+            see(topic, PointCloud2, lambda message: message.header.stamp)
+        see('shown/update', SurfelUpdate, lambda message: message.header.stamp)
+        see('shown/markers', MarkerArray, lambda message: message.markers[-1].header.stamp)
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, read)
+        self.addCleanup(subscriber.unregister)
+        wait_until(lambda: len(stamps) == 5, what='all topics')
+        for topic, stamp in stamps.items():
+            self.assertTrue(start <= stamp <= rospy.Time.now(), (topic, stamp.to_sec(), start.to_sec()))
+        wait_until(lambda: str(surfels) in counted, what='the surfels in /diagnostics')
 
     def check_ends(self, process):
         """The process ends on SIGINT, as roslaunch sends it."""
@@ -83,6 +202,16 @@ class Processes(unittest.TestCase):
         camera.send(0, send_pose=False)
         time.sleep(0.3)
         self.check_ends(process)
+
+    def test_help_starts_nothing(self):
+        program = find_node('frontier_surfels', 'mapper_node')[0]
+        for option in ('--help', '-h'):
+            result = subprocess.run([program, '__name:=helpful', option], capture_output=True, text=True, timeout=TIMEOUT,
+                                    env={**os.environ, 'ROS_MASTER_URI': 'http://localhost:1'})  # it would wait for this master for ever
+            self.assertEqual((result.returncode, result.stderr), (0, ''))
+            self.assertRegex(result.stdout, 'usage: .*mapper_node')
+            for word in ('depth/image', '~update', '~get_surfels', 'z_max', 'tf_timeout'):
+                self.assertIn(word, result.stdout)
 
     def test_ends_without_a_frame(self):
         process = self.start('idle')

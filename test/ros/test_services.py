@@ -1,16 +1,21 @@
 #!/usr/bin/python3
 """Reset, pause, boxes, saving and loading. When a file cannot be read or written, the map and older files stay as they were."""
 import os
+import re
 import resource
 import shutil
+import signal
 import subprocess
 import tempfile
+import xmlrpc.client
 
 import numpy
+import rosgraph
 from frontier_surfels.msg import FrameReport
 from roslib.packages import find_node
 
 from mapper_client import Mapper, MapperTest, case, run
+from synthetic_camera import header_of, pose
 
 SMALL_FILE = 64 * 1024  # [byte]
 
@@ -102,6 +107,32 @@ class Services(MapperTest):
                 self.check_refused(self.mapper.load(path), name + "'", r'must end in \.ply or \.pcd')
         self.assertEqual(sorted(os.listdir(self.folder)), ['map.pcd', 'map.ply'])
 
+    def test_answers_name_the_absolute_path(self):
+        """The node's current folder is not that of its caller, and no shell expands `~` for it."""
+        self.map_walk(1)
+        home = tempfile.mkdtemp(dir=os.path.expanduser('~'))
+        self.addCleanup(shutil.rmtree, home)
+        current = os.readlink(f'/proc/{self.mapper_process()}/cwd')
+        for given, path in ((os.path.join('~', os.path.basename(home), 'map.ply'), os.path.join(home, 'map.ply')),
+                            (os.path.relpath(self.path, current), self.path)):
+            with case(given):
+                for answer in (self.mapper.save(given), self.mapper.load(given)):
+                    self.check_succeeded(answer)
+                    self.assertIn(f' {path}.', answer.message)
+                self.assertTrue(os.path.exists(path))
+
+    def mapper_process(self):
+        """The number of the mapper's process."""
+        server = rosgraph.Master('/test_services').lookupNode('/mapper')
+        return xmlrpc.client.ServerProxy(server).getPid('/test_services')[2]
+
+    def test_names_that_are_too_long(self):
+        path = os.path.join(self.folder, 300 * 'n' + '.ply')
+        of_an_empty_map = self.mapper.save(path)
+        self.map_walk(1)
+        for answer in (of_an_empty_map, self.mapper.save(path), self.mapper.load(path)):
+            self.check_refused(answer, '/n{300}.ply.*a shorter one')
+
     def test_save_where_nothing_can_be_written(self):
         self.map_walk(1)
         os.mkdir(self.path)
@@ -135,19 +166,57 @@ class Services(MapperTest):
         self.assertEqual(before[0], after[0])
         self.assert_same_map(before[1], after[1])
 
-    def start_full(self):
-        """Starts a mapper whose files can be limited in size later, which is like a full disk."""
-        command = [find_node('frontier_surfels', 'mapper_node')[0], '__name:=full', 'depth/image:=camera/depth/image_rect',
-                   'depth/camera_info:=camera/depth/camera_info']
+    def start(self, name, *arguments):
+        """Starts another mapper."""
+        command = [find_node('frontier_surfels', 'mapper_node')[0], f'__name:={name}', 'depth/image:=camera/depth/image_rect',
+                   'depth/camera_info:=camera/depth/camera_info', *arguments]
         process = subprocess.Popen(command, restore_signals=False)  # else the process would inherit that Python ignores SIGXFSZ
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
-        mapper = Mapper('full')
+        mapper = Mapper(name)
         mapper.wait_until_connected(*self.camera.raw())
         return process, mapper
 
+    def saved(self, mapper):
+        """Number of surfels in the file that the mapper saves."""
+        path = os.path.join(self.folder, 'saved.ply')
+        self.check_succeeded(mapper.save(path))
+        with open(path, 'rb') as file:
+            return int(re.search(rb'element vertex (\d+)', file.read()).group(1))
+
+    def test_save_with_a_map_folder_writes_the_whole_map(self):
+        arguments = ['_map_folder:=' + os.path.join(self.folder, 'kept'), '_eviction_radius:=10']
+        process, mapper = self.start('keeping', *arguments)
+        self.check_integrated(self.camera.send(0), mapper)
+        count = len(mapper.surfels())
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(20), 0)
+
+        mapper = self.start('continuing', *arguments)[1]
+        self.assertEqual(len(mapper.surfels()), 0)  # none is in memory before the first frame
+        self.assertEqual(self.saved(mapper), count)
+        header = header_of(self.camera.frame)
+        T_far = pose(1)
+        T_far[:3, 3] += (200, 0, 0)
+        self.camera.send_pose(T_far, header.stamp)
+        self.camera.send(1, stamp=header.stamp, send_pose=False)
+        self.check_integrated(header, mapper)
+        near = len(mapper.surfels())
+        self.assertGreater(near, 1000)
+        self.assertEqual(self.saved(mapper), count + near)
+
+    def test_an_empty_map_replaces_no_file(self):
+        self.map_walk(1)
+        self.check_succeeded(self.mapper.save(self.path))
+        size = os.path.getsize(self.path)
+        self.mapper.reset()
+        self.check_refused(self.mapper.save(self.path), 'empty.*map.ply.*delete')
+        self.assertEqual(os.path.getsize(self.path), size)
+        os.remove(self.path)
+        self.check_succeeded(self.mapper.save(self.path))
+
     def test_full_disk_keeps_the_older_file(self):
-        process, full = self.start_full()
+        process, full = self.start('full')
         self.check_succeeded(full.save(self.path))  # of an empty map
         with open(self.path, 'rb') as file:
             old = file.read()

@@ -95,8 +95,8 @@ TEST(SurfelMarkers, SendOnlyBlocksThatWereTouched) {
   const std::size_t all = world.update().markers.size();
   ASSERT_GT(all, 500U);
 
-  Surfel moved = world.map.slots()[77];
-  moved.position = 0.99F * world.map.slots()[78].position;
+  Surfel moved = *world.map.slots().find(77);
+  moved.position = 0.99F * world.map.slots().find(78)->position;
   world.apply({moved}, {});
   const MarkerArray message = world.update();
   EXPECT_LE(message.markers.size(), 4U + 1U);  // two blocks with two labels each, and the numbers of surfels

@@ -33,6 +33,37 @@ SurfelMirror mirror_of(const std::vector<Surfel>& surfels) {
   return mirror;
 }
 
+/// An update that goes into one message.
+SurfelUpdate whole_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box,
+                           Label confident = Label::kFrontier) {
+  UpdateMessages messages(changes, since, box, confident, kMostSurfels);
+  EXPECT_EQ(messages.size(), 1U);
+  const SurfelUpdate update = messages.next();
+  EXPECT_TRUE(messages.done());
+  EXPECT_EQ(update.part, 0U);
+  EXPECT_EQ(update.parts, 1U);
+  return update;
+}
+
+/// Puts the parts of an update together. Checks what they must have in common.
+Changes together(UpdateMessages messages, std::uint64_t since, std::size_t most) {
+  Changes changes;
+  for (std::uint32_t part = 0; !messages.done(); ++part) {
+    const SurfelUpdate message = messages.next();
+    changes.sequence = message.sequence;
+    EXPECT_EQ(message.since, since);
+    EXPECT_EQ(message.part, part);
+    EXPECT_EQ(message.parts, messages.size());
+    const auto surfels = to_surfels(message.surfels);
+    EXPECT_LE(surfels.size(), most);
+    EXPECT_LE(message.removed.size(), most);
+    EXPECT_TRUE(message.removed.empty() || changes.updated.empty()) << "ids are removed after surfels have been added";
+    changes.updated.insert(changes.updated.end(), surfels.begin(), surfels.end());
+    changes.removed.insert(changes.removed.end(), message.removed.begin(), message.removed.end());
+  }
+  return changes;
+}
+
 /// Indices of fields in a cloud.
 constexpr std::size_t kId = 3, kLabel = 7, kRgb = 8, kRadius = 9, kConfidence = 10, kCurvature = 11;
 
@@ -104,7 +135,8 @@ TEST(SurfelClouds, AreConfidentOfOneLabel) {
     const PointCloud2 cloud = to_cloud({frontier, occupied}, confident);
     EXPECT_EQ(read<float>(cloud, 0, kConfidence), confident == Label::kFrontier ? 1 : 0);
     EXPECT_EQ(read<float>(cloud, 1, kConfidence), confident == Label::kOccupied ? 1 : 0);
-    const SurfelUpdate update = to_message(Changes{1, {frontier}, {}}, 0, Eigen::AlignedBox3f(), confident);
+    frontier.radius = 1;
+    const SurfelUpdate update = whole_message(Changes{1, {frontier}, {}}, 0, Eigen::AlignedBox3f(), confident);
     EXPECT_EQ(read<float>(update.surfels, 0, kConfidence), confident == Label::kFrontier ? 1 : 0);
   }
   EXPECT_EQ(to_cloud({frontier, occupied}).data, to_cloud({frontier, occupied}, Label::kFrontier).data);
@@ -114,7 +146,7 @@ TEST(SurfelClouds, OfAMapLeaveOutItsGaps) {
   Rng rng(2);
   SurfelMirror mirror = mirror_of(random_surfels(rng, 5000));
   mirror.apply(random_changes(rng, 1, 6000, 2000), 1);
-  ASSERT_LT(mirror.size(), mirror.slots().size());
+  ASSERT_LT(mirror.size(), mirror.surfels().back().id);
   EXPECT_TRUE(same(to_surfels(to_cloud(mirror)), mirror.surfels()));
   for (const Label label : {Label::kOccupied, Label::kFrontier})
     EXPECT_TRUE(same(to_surfels(to_cloud(mirror, Label::kFrontier, label)), mirror.surfels(label)));
@@ -199,7 +231,7 @@ TEST(SurfelClouds, AreRefusedWhenTheDataAreDamaged) {
 TEST(SurfelUpdates, SayWhatHasChanged) {
   Rng rng(4);
   const Changes changes = random_changes(rng, 41, 1000, 300);
-  const SurfelUpdate update = to_message(changes, 41, Eigen::AlignedBox3f(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, 5, 6)));
+  const SurfelUpdate update = whole_message(changes, 41, Eigen::AlignedBox3f(Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, 5, 6)));
   EXPECT_EQ(update.since, 41U);
   EXPECT_EQ(update.sequence, changes.sequence);
   EXPECT_EQ(update.removed, changes.removed);
@@ -211,8 +243,54 @@ TEST(SurfelUpdates, SayWhatHasChanged) {
   EXPECT_EQ(update.box_max.y, 5);
   EXPECT_EQ(update.box_max.z, 6);
 
-  const SurfelUpdate none = to_message(Changes{8, {}, {}}, 7, Eigen::AlignedBox3f());
+  const SurfelUpdate none = whole_message(Changes{8, {}, {}}, 7, Eigen::AlignedBox3f());
   EXPECT_GT(none.box_min.x, none.box_max.x);
+}
+
+TEST(SurfelUpdates, ComeInPartsThatHaveEverything) {
+  Rng rng(6);
+  const Changes changes = random_changes(rng, 41, 1000, 300);
+  for (const std::size_t most : {7, 100, 299, 300, 301, 1000}) {
+    UpdateMessages messages(changes, 41, Eigen::AlignedBox3f(), Label::kFrontier, most);
+    const std::size_t surfels = changes.updated.size(), removed = changes.removed.size();
+    EXPECT_EQ(messages.size(), (surfels + most - 1) / most + (removed + most - 1) / most - 1);
+    const Changes all = together(messages, 41, most);
+    EXPECT_EQ(all.sequence, changes.sequence);
+    EXPECT_EQ(all.removed, changes.removed);
+    EXPECT_TRUE(same(all.updated, changes.updated)) << "at most " << most;
+  }
+}
+
+TEST(SurfelUpdates, OfAWholeMapComeInParts) {
+  Rng rng(7);
+  SurfelMirror mirror = mirror_of(random_surfels(rng, 5000));
+  mirror.apply(random_changes(rng, 1, 6000, 2000), 1);
+  for (const std::size_t most : {std::size_t{100}, mirror.size() - 1, mirror.size(), kMostSurfels}) {
+    const Changes all = together({mirror, Eigen::AlignedBox3f(), Label::kFrontier, most}, 0, most);
+    EXPECT_EQ(all.sequence, mirror.sequence());
+    EXPECT_TRUE(same(all.updated, mirror.surfels())) << "at most " << most;
+  }
+}
+
+TEST(SurfelClouds, AboveTheLimitAreRefusedWithTheWaysOut) {
+  Rng rng(8);
+  const auto surfels = random_surfels(rng, 100);
+  const SurfelMirror mirror = mirror_of(surfels);
+  EXPECT_TRUE(same(to_surfels(to_cloud(surfels, Label::kFrontier, 100)), surfels));
+  EXPECT_TRUE(same(to_surfels(to_cloud(mirror, Label::kFrontier, std::nullopt, mirror.size())), mirror.surfels()));
+  const auto refusal = [](const auto& make) -> std::string {
+    try {
+      make();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const std::string& text : {refusal([&] { to_cloud(surfels, Label::kFrontier, 99); }),
+                                  refusal([&] { to_cloud(mirror, Label::kFrontier, std::nullopt, mirror.size() - 1); })}) {
+    for (const char* part : {"surfels are more than a message may have", "~message_limit", "~get_surfels with smaller boxes", "~update"})
+      EXPECT_NE(text.find(part), std::string::npos) << text;
+  }
 }
 
 TEST(SerializedMessages, AreNotSerialisedAgain) {

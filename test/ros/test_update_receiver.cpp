@@ -70,6 +70,15 @@ class Truth {
     return message;
   }
 
+  /// The same update in parts of at most ten surfels.
+  std::vector<SurfelUpdate> parts(std::uint64_t since) const {
+    const Changes contained = changes(since);
+    messages::UpdateMessages messages(contained, since, Eigen::AlignedBox3f(), Label::kFrontier, 10);
+    std::vector<SurfelUpdate> parts;
+    while (!messages.done()) parts.push_back(messages.next());
+    return parts;
+  }
+
   std::uint64_t sequence() const { return sequence_; }
 
   /// All surfels when the map had this number, ordered by id.
@@ -140,6 +149,43 @@ TEST_F(UpdateReceiverTest, WhoJoinsLateAsksOnce) {
   EXPECT_TRUE(has(11));
   EXPECT_EQ(asked_, 1);
   EXPECT_EQ(receiver_.gaps(), 0u) << "no update was missing";
+}
+
+TEST_F(UpdateReceiverTest, AppliesAnUpdateWhenAllItsPartsHaveCome) {
+  step(5);
+  for (const SurfelUpdate& part : truth_.parts(0)) {
+    EXPECT_EQ(receiver_.map().sequence(), 0u) << "before part " << part.part;
+    receiver_.receive(part);
+  }
+  EXPECT_TRUE(has(5));
+  step(5);
+  const auto parts = truth_.parts(5);
+  ASSERT_GT(parts.size(), 2u);
+  for (const SurfelUpdate& part : parts) {
+    EXPECT_TRUE(has(5)) << "before part " << part.part;
+    receiver_.receive(part);
+  }
+  EXPECT_TRUE(has(10));
+  EXPECT_EQ(asked_, 0);
+}
+
+TEST_F(UpdateReceiverTest, HealsTheLossOfAPart) {
+  step();
+  receive(0);
+  for (const std::size_t lost : {0, 1, 2}) {
+    const std::uint64_t before = truth_.sequence();
+    step(5);
+    auto parts = truth_.parts(before);
+    ASSERT_GT(parts.size(), 2u);
+    parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(std::min(lost, parts.size() - 1)));
+    for (const SurfelUpdate& part : parts) receiver_.receive(part);
+    EXPECT_TRUE(has(before)) << "an incomplete update was applied";
+    step();
+    receive(before + 5);
+    EXPECT_TRUE(has(before + 6));
+  }
+  EXPECT_EQ(asked_, 3);
+  EXPECT_EQ(receiver_.gaps(), 3u);
 }
 
 TEST_F(UpdateReceiverTest, HealsAGap) {

@@ -25,6 +25,7 @@ class Follower:
     def __init__(self, mapper, lose=()):
         self.mapper, self.lose = mapper, set(lose)
         self.surfels, self.sequence, self.gaps, self.whole, self.received = {}, 0, 0, 0, 0
+        self.parts, self.most_parts = [], 0
         self.faults = []
         self.subscriber = rospy.Subscriber(f'{mapper.name}/update', SurfelUpdate, self.receive)
 
@@ -38,7 +39,18 @@ class Follower:
             self.faults.append(fault)
 
     def apply(self, update):
-        changed = to_array(update.surfels)
+        self.most_parts = max(self.most_parts, update.parts)
+        if update.part != len(self.parts):
+            self.parts = []
+            if update.part != 0:
+                return
+        self.parts.append(update)
+        if len(self.parts) < update.parts:
+            return
+        parts, self.parts = self.parts, []
+        assert len({(part.since, part.sequence, part.parts) for part in parts}) == 1
+        update.removed = sum((part.removed for part in parts), ())
+        changed = numpy.concatenate([to_array(part.surfels) for part in parts])
         self.check_box(update, changed)
         if update.since == 0:
             self.surfels, self.sequence = {}, 0

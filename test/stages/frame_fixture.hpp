@@ -48,6 +48,13 @@ class FrameFixture {
   SurfelMap& map() { return map_; }
   const SurfelMap& map() const { return map_; }
   SeenPoints& seen() { return seen_; }
+
+  /// Ends the frame. @return what it has changed
+  Changes finish(std::uint32_t frame) {
+    map_.finish_frame("test", frame);
+    map_.commit(frame);
+    return map_.last_changes();
+  }
   RecentViews& views() { return views_; }
   MapAccess& access() { return access_; }
   const MapAccess& access() const { return access_; }

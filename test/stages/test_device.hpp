@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "opencl/commands.hpp"
 
@@ -34,10 +35,28 @@ inline Commands& test_commands() {
   return *commands;
 }
 
+/// Whether a device can be limited to some of its compute units. Tests of threads are skipped only if it cannot: any other error of a
+/// device is a fault.
+inline bool can_be_divided(const Device& device) {
+  const auto parts = device.device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  return std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) != parts.end();
+}
+
+/// Number of OpenCL devices of all platforms.
+inline std::size_t number_of_devices() {
+  std::vector<cl::Platform> platforms;
+  cl::Platform::get(&platforms);
+  std::size_t count = 0;
+  for (const cl::Platform& platform : platforms) {
+    cl_uint devices = 0;
+    if (clGetDeviceIDs(platform(), CL_DEVICE_TYPE_ALL, 0, nullptr, &devices) == CL_SUCCESS) count += devices;
+  }
+  return count;
+}
+
 /// The same device limited to one thread; null if it cannot be limited.
 inline std::unique_ptr<Commands> one_thread_commands() {
-  const auto parts = test_commands().device().device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
-  if (std::find(parts.begin(), parts.end(), CL_DEVICE_PARTITION_BY_COUNTS) == parts.end()) return nullptr;
+  if (!can_be_divided(test_commands().device())) return nullptr;
   Config one = test_config();
   one.threads = 1;
   return std::make_unique<Commands>(choose_device(one));

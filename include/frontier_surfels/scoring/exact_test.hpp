@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
@@ -41,9 +42,9 @@ class ExactTest {
   /// score() uses boundary(segments, kSeed), so that the scores of two maps can be compared.
   static constexpr std::uint64_t kSeed = 1;
 
-  /// @param z_min, z_max  depths outside are no measurements [m]
-  /// @param decimation    every so many pixels of the images are used, as by the mapper
-  ExactTest(double z_min, double z_max, int decimation);
+  /// @param config  says how the mapper reads depth images: z_min, z_max, decimation, depth_unit and what is carved
+  /// @throws Error  if these make no sense
+  explicit ExactTest(const Config& config);
   ~ExactTest();
   ExactTest(ExactTest&&) noexcept;
   ExactTest& operator=(ExactTest&&) noexcept;
@@ -53,8 +54,9 @@ class ExactTest {
   void add(const DepthFrame& frame);
   std::size_t size() const;
 
-  /// known(p) <=> there is a frame m and its pixel q = round(pi(T_m^-1 p)) inside the image with a valid depth d,
-  /// z_min <= d <= z_max, and 0 < z(T_m^-1 p) < d.
+  /// known(p) <=> there is a frame m and its pixel q = round(pi(T_m^-1 p)) inside the image that has seen free space up to d, and
+  /// 0 < z(T_m^-1 p) < d. Where z_min <= depth <= z_max, d is the depth. Where the depth is beyond z_max and the configuration carves such
+  /// pixels, d is z_max. Other pixels have seen nothing.
   bool known(const Eigen::Vector3d& p_world) const;
 
   /// `segments` random rays: a random frame and valid pixel, a point at 2-98 % of its depth, a random direction; marched in 1 cm steps
@@ -71,8 +73,7 @@ class ExactTest {
                    const std::function<bool(double)>& progress = {}, std::vector<Verdict>* verdicts = nullptr) const;
 
  private:
-  double z_min_, z_max_;
-  int decimation_;
+  Config config_;
   std::vector<ExactView> views_;
 };
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
@@ -25,11 +26,14 @@ struct InsertionTime {
 
 class OctomapTruth {
  public:
-  /// @param resolution  side of a voxel [m];  z_min, z_max: depths outside are no measurements;  decimation: as by the mapper
-  OctomapTruth(double resolution, double z_min, double z_max, int decimation);
+  /// @param resolution  side of a voxel [m]
+  /// @param config      says how the mapper reads depth images: z_min, z_max, decimation, depth_unit and what is carved
+  /// @throws Error      if these make no sense
+  OctomapTruth(double resolution, const Config& config);
   ~OctomapTruth();
 
-  /// Inserts a frame's points with insertPointCloud. @return what that took, without the making of the point cloud
+  /// Inserts a frame's points as insertPointCloud does. Where the mapper carves up to z_max, the ray is free up to there, like the rays
+  /// that insertPointCloud cuts at its maximum range. @return what that took, without the making of the point cloud
   InsertionTime add(const DepthFrame& frame);
 
   /// M: unknown voxels that are 6-neighbours of known (free or occupied) ones - eq. (17)-(18): one surfel at the centre of each. Normal:

@@ -32,8 +32,13 @@ class UpdateReceiver {
   std::size_t gaps() const { return gaps_; }  ///< how often updates were missing; joining late does not count
 
  private:
+  bool collect(const SurfelUpdate& update);
+
   GetAll get_all_;
   SurfelMirror map_;
+  Changes collected_;            ///< of the parts of an update that have come so far
+  std::uint64_t since_ = 0;      ///< of these parts
+  std::uint32_t next_part_ = 0;  ///< number that the next part must have; 0: the first part of any update
   std::size_t gaps_ = 0;
 };
 

@@ -90,6 +90,7 @@ FrameReport RunningMapper::report_on(const ros::Time& stamp, double timeout) {
   if (found) return *found;
   if (gone) throw Error("The mapper " + name_ + " has ended during the replay: read its last messages, and start it again.");
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text << "The mapper " << name_ << " has not reported on the depth image of stamp " << stamp << " within " << timeout
        << " s: check whether it still runs, read its last messages, and start it again.";
   throw Error(text.str());

@@ -2,7 +2,11 @@
 
 #include <frontier_surfels/FrameReport.h>
 #include <image_transport/exception.h>
+#include <ros/console.h>
+#include <ros/master.h>
+#include <ros/this_node.h>
 
+#include <set>
 #include <utility>
 
 namespace frontier_surfels {
@@ -12,6 +16,34 @@ constexpr int kQueue = 10;  // messages; callbacks return at once, so that it is
 constexpr auto kPoll = std::chrono::milliseconds(1);
 constexpr auto kColorWait = std::chrono::milliseconds(30);  // a camera's period: mapping without colour is better than waiting longer
 
+/// The topics of images, for people.
+std::string published_images() {
+  using XmlRpc::XmlRpcValue;
+  XmlRpcValue request, response, topics;
+  request[0] = ros::this_node::getName();
+  request[1] = "";
+  std::set<std::string> names;
+  if (ros::master::execute("getPublishedTopics", request, response, topics, false)) {
+    for (int i = 0; i < topics.size(); ++i) {
+      const std::string type = topics[i][1];
+      if (type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage") names.insert(topics[i][0]);
+    }
+  }
+  if (names.empty()) return "No node publishes images.";
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return "The topics of images are: " + all + ".";
+}
+
+/// For people.
+std::string installed_transports(const image_transport::ImageTransport& transport) {
+  std::set<std::string> names = {"raw", "compressed", "compressedDepth"};
+  for (const std::string& name : transport.getLoadableTransports()) names.insert(name.substr(name.find('/') + 1));
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
+}
+
 }  // namespace
 
 CameraInput::CameraInput(const NodeConfig& config, CameraTopics topics, FramePoses& poses, Listener listener)
@@ -19,7 +51,8 @@ CameraInput::CameraInput(const NodeConfig& config, CameraTopics topics, FramePos
       topics_(std::move(topics)),
       poses_(poses),
       listener_(std::move(listener)),
-      inbox_(std::chrono::duration<double>(config.tf_timeout)) {}
+      inbox_(std::chrono::duration<double>(config.tf_timeout)),
+      remarks_(config.mapper, [](const std::string& remark) { ROS_WARN("%s", remark.c_str()); }) {}
 
 CameraInput::~CameraInput() {
   {
@@ -30,35 +63,41 @@ CameraInput::~CameraInput() {
   if (thread_.joinable()) thread_.join();
 }
 
-void CameraInput::start(const ros::NodeHandle& nh) {
+void CameraInput::start(const ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
   ros::NodeHandle handle(nh);
   info_topic_ = handle.resolveName(topics_.info);
   transport_ = std::make_unique<image_transport::ImageTransport>(handle);
   thread_ = std::thread([this] { run(); });
   info_ = handle.subscribe(topics_.info, kQueue, &CameraInput::add_info, this);
-  if (config_.use_color)
-    color_ = subscribe(handle, topics_.color, config_.color_transport, [this](const auto& image) { add_color(image); });
-  depth_ = subscribe(handle, topics_.depth, config_.image_transport, [this](const auto& image) { add_depth({image, Clock::now()}); });
+  if (config_.use_color) {
+    const Transport transport = {config_.color_transport, pnh, "color_transport"};
+    color_ = subscribe(handle, topics_.color, transport, [this](const auto& image) { add_color(image); });
+  }
+  const Transport transport = {config_.image_transport, pnh, "image_transport"};
+  depth_ = subscribe(handle, topics_.depth, transport, [this](const auto& image) { add_depth({image, Clock::now()}); });
 }
 
 /// The two compressed transports that depth cameras use are decoded here, not by image_transport: their plugins need not be installed, and
 /// the map is the same as that of a bag.
-CameraInput::Subscription CameraInput::subscribe(ros::NodeHandle& nh, const std::string& topic, const std::string& transport,
+CameraInput::Subscription CameraInput::subscribe(ros::NodeHandle& nh, const std::string& topic, const Transport& transport,
                                                  const OnImage& on_image) {
   Subscription subscription;
-  if (transport == "compressedDepth" || transport == "compressed") {
+  if (transport.name == "compressedDepth" || transport.name == "compressed") {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> callback = [on_image](const auto& image) {
       on_image({nullptr, image});
     };
-    subscription.compressed = nh.subscribe<sensor_msgs::CompressedImage>(nh.resolveName(topic) + "/" + transport, kQueue, callback);
+    subscription.compressed = nh.subscribe<sensor_msgs::CompressedImage>(nh.resolveName(topic) + "/" + transport.name, kQueue, callback);
     return subscription;
   }
   const boost::function<void(const sensor_msgs::ImageConstPtr&)> callback = [on_image](const auto& image) { on_image({image, nullptr}); };
+  // The hints read the parameter once more. Without its name, that of the depth images would also choose the transport of the colour
+  // images.
+  const image_transport::TransportHints hints(transport.name, ros::TransportHints(), transport.pnh, transport.parameter);
   try {
-    subscription.transported = transport_->subscribe(topic, kQueue, callback, ros::VoidPtr(), image_transport::TransportHints(transport));
-  } catch (const image_transport::Exception& error) {
-    throw Error("The image transport '" + transport + "' cannot be used for " + topic + " (" + error.what() +
-                "): install its plugin, or choose raw.");
+    subscription.transported = transport_->subscribe(topic, kQueue, callback, ros::VoidPtr(), hints);
+  } catch (const image_transport::Exception&) {
+    throw Error("~" + transport.parameter + " is '" + transport.name + "', for which there is no plugin: install it, or choose one of " +
+                installed_transports(*transport_) + ".");
   }
   return subscription;
 }
@@ -67,6 +106,7 @@ void CameraInput::add_depth(const DepthArrival& arrival) {
   std::vector<DroppedImage> dropped;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    depth_came_ = true;
     try {
       if (paused_) throw DroppedFrame(FrameReport::DROPPED_PAUSED, "Mapping is paused: call ~pause with false to go on.");
       check_depth(arrival.image);
@@ -88,6 +128,7 @@ void CameraInput::add_info(const sensor_msgs::CameraInfoConstPtr& info) {
 
 void CameraInput::add_color(const messages::ImageMessage& image) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  color_came_ = true;
   colors_.add(image, Clock::now());
 }
 
@@ -97,6 +138,9 @@ std::vector<DroppedImage> CameraInput::follow_time(const std_msgs::Header& heade
   constexpr double kLate = 1;  // [s]; no delay of transport is longer
   if (header.stamp.isZero())
     throw DroppedFrame(FrameReport::DROPPED_NO_POSE, "The image's stamp is 0, which is no time: its driver must set it.");
+  if (messages::strip_slash(header.frame_id).empty())
+    throw DroppedFrame(FrameReport::DROPPED_NO_POSE,
+                       "The image's frame_id is empty: its driver must set it to the camera's optical frame.");
   const ros::Time now = ros::Time::now();
   clock_went_back_ = clock_went_back_ || now < last_now_;
   last_now_ = now;
@@ -173,6 +217,21 @@ std::optional<CompleteImage> CameraInput::take() {
   return inbox_.is_ready() ? std::make_optional(inbox_.take()) : std::nullopt;
 }
 
+std::vector<std::string> CameraInput::missing() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!depth_came_) {
+    const std::string topic = depth_.topic(), none = "No depth image has come on " + topic;
+    if (depth_.publishers() == 0)
+      return {none + ", which no node publishes: remap " + topics_.depth +
+              " to the topic of the depth camera, and check ~image_transport. " + published_images()};
+    return {none + ", although a node publishes it: check with `rostopic hz " + topic +
+            "` that it sends images, and that the machines reach each other (ROS_IP, ROS_HOSTNAME)."};
+  }
+  if (!config_.use_color || color_came_) return {};
+  return {"No colour image has come on " + color_.topic() + ", so that the map gets no colour: remap " + topics_.color +
+          " to images that are registered to depth and check ~color_transport, or set ~use_color to false."};
+}
+
 void CameraInput::pause(bool paused) {
   std::vector<DroppedImage> dropped;
   {
@@ -195,6 +254,7 @@ void CameraInput::reset() {
     clock_went_back_ = false;
   }
   last_mapped_ = ros::Time();
+  remarks_.forget();
   tell(dropped);
 }
 

@@ -16,6 +16,7 @@
 
 #include "ros/input/companions.hpp"
 #include "ros/input/frame_poses.hpp"
+#include "ros/input/frame_remarks.hpp"
 #include "ros/input/inbox.hpp"
 #include "ros/input/parameters.hpp"
 
@@ -44,8 +45,9 @@ class CameraInput {
   CameraInput(const NodeConfig& config, CameraTopics topics, FramePoses& poses, Listener listener);
   ~CameraInput();
 
-  /// Subscribes the topics and begins to look for what images lack. To be called once. @throws Error if an image transport is not installed
-  void start(const ros::NodeHandle& nh);
+  /// Subscribes the topics and begins to look for what images lack. To be called once. @param pnh  where the parameters were read
+  /// @throws Error if an image transport is not installed
+  void start(const ros::NodeHandle& nh, const ros::NodeHandle& pnh);
 
   // What arrives. From any thread.
   void add_depth(const DepthArrival& arrival);
@@ -61,6 +63,9 @@ class CameraInput {
   /// Takes the next ready image; empty if there is none.
   std::optional<CompleteImage> take();
 
+  /// Sentences about the topics on which no image has come yet, with the likely cause and what to do.
+  std::vector<std::string> missing() const;
+
   /// While the camera is paused its images are dropped, those included that wait already.
   void pause(bool paused);
 
@@ -71,14 +76,25 @@ class CameraInput {
   const ros::Time& last_mapped() const { return last_mapped_; }
   void set_last_mapped(const ros::Time& stamp) { last_mapped_ = stamp; }
 
+  /// For the mapping thread.
+  FrameRemarks& remarks() { return remarks_; }
+
  private:
   struct Subscription {  // one of the two
     image_transport::Subscriber transported;
     ros::Subscriber compressed;
+
+    std::string topic() const { return compressed ? compressed.getTopic() : transported.getTopic(); }
+    std::uint32_t publishers() const { return compressed ? compressed.getNumPublishers() : transported.getNumPublishers(); }
+  };
+  struct Transport {
+    std::string name;
+    ros::NodeHandle pnh;
+    std::string parameter;  ///< of pnh, that has the name
   };
   using OnImage = std::function<void(const messages::ImageMessage&)>;
 
-  Subscription subscribe(ros::NodeHandle& nh, const std::string& topic, const std::string& transport, const OnImage& on_image);
+  Subscription subscribe(ros::NodeHandle& nh, const std::string& topic, const Transport& transport, const OnImage& on_image);
   void run();
   void tell(const std::vector<DroppedImage>& dropped) const;
 
@@ -99,10 +115,12 @@ class CameraInput {
   CameraInfos infos_;
   ColorImages colors_;
   bool paused_ = false, stopping_ = false;
+  bool depth_came_ = false, color_came_ = false;
   ros::Time last_now_;            ///< ROS time when the last image arrived
   bool clock_went_back_ = false;  ///< since the last image that became ready
 
   ros::Time last_mapped_;  ///< the mapping thread's own
+  FrameRemarks remarks_;   ///< the mapping thread's own
   std::thread thread_;
   std::string info_topic_;  ///< resolved, for people
   std::unique_ptr<image_transport::ImageTransport> transport_;

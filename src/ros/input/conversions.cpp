@@ -13,6 +13,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "frontier_surfels/number_text.hpp"
+
 namespace frontier_surfels::messages {
 namespace {
 
@@ -53,12 +55,12 @@ Pixels<View> view(const cv::Mat& decoded) {
 
 Pixels<DepthImage> view_depth(const cv::Mat& decoded) {
   Pixels<DepthImage> pixels = view<DepthImage>(decoded);
-  pixels.view.encoding = decoded.type() == CV_16UC1 ? DepthImage::Encoding::kMillimetresU16 : DepthImage::Encoding::kMetresF32;
+  pixels.view.encoding = decoded.type() == CV_16UC1 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   return pixels;
 }
 
 Pixels<DepthImage> view_depth(const sensor_msgs::ImageConstPtr& image, DepthImage::Encoding encoding) {
-  check_size(*image, encoding == DepthImage::Encoding::kMillimetresU16 ? 2 : 4);
+  check_size(*image, encoding == DepthImage::Encoding::kStepsU16 ? 2 : 4);
   Pixels<DepthImage> pixels = view<DepthImage>(image);
   pixels.view.encoding = encoding;
   pixels.view.swap_bytes = static_cast<bool>(image->is_bigendian) != kThisMachineIsBigEndian;
@@ -121,6 +123,10 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 
   CompressedDepthHeader header;
   std::memcpy(&header, message.data.data(), sizeof(header));
+  const auto [a, b] = header.quantisation;
+  if (!std::isfinite(a) || !std::isfinite(b) || a == 0)
+    throw BadFrame("its depth quantisation (" + rounded_text(a, 6) + ", " + rounded_text(b, 6) +
+                   ") is not valid: record it again with compressed_depth_image_transport, or record raw images");
   return metres_from_inverse(values, header.quantisation);
 }
 
@@ -129,8 +135,7 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
 Pixels<DepthImage> depth_pixels(const ImageMessage& message) {
   if (message.compressed) return view_depth(decode_depth(*message.compressed));
   const std::string& encoding = message.raw->encoding;
-  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16)
-    return view_depth(message.raw, DepthImage::Encoding::kMillimetresU16);
+  if (encoding == encodings::TYPE_16UC1 || encoding == encodings::MONO16) return view_depth(message.raw, DepthImage::Encoding::kStepsU16);
   if (encoding == encodings::TYPE_32FC1) return view_depth(message.raw, DepthImage::Encoding::kMetresF32);
   throw BadFrame("the encoding '" + encoding + "' is not one of depth (16UC1, mono16, 32FC1)");
 }
@@ -151,7 +156,7 @@ std::optional<cv::Size> stated_size(const ImageMessage& message) {
 }
 
 cv::Mat copy(const DepthImage& image) {
-  cv::Mat depth(image.height, image.width, image.encoding == DepthImage::Encoding::kMillimetresU16 ? CV_16UC1 : CV_32FC1);
+  cv::Mat depth(image.height, image.width, image.encoding == DepthImage::Encoding::kStepsU16 ? CV_16UC1 : CV_32FC1);
   const std::size_t size = depth.elemSize();
   for (int row = 0; row < depth.rows; ++row) {
     std::uint8_t* values = depth.ptr(row);
@@ -173,17 +178,35 @@ cv::Mat copy(const ColorImage& image) {
   return bgr;
 }
 
+namespace {
+
+/// All values 0 mean the whole sensor, whose size may be unknown. @throws BadFrame
+void check_region(const sensor_msgs::CameraInfo& info) {
+  const sensor_msgs::RegionOfInterest& roi = info.roi;
+  const bool is_whole = roi.x_offset == 0 && roi.y_offset == 0 && roi.width == 0 && roi.height == 0;
+  if (is_whole || info.width == 0 || info.height == 0) return;
+  const std::uint64_t right = std::uint64_t{roi.x_offset} + roi.width, bottom = std::uint64_t{roi.y_offset} + roi.height;
+  if (roi.width > 0 && roi.height > 0 && right <= info.width && bottom <= info.height) return;
+  throw BadFrame("the region of interest in its camera_info, " + std::to_string(roi.width) + "x" + std::to_string(roi.height) +
+                 " pixels at (" + std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) + "), is not within the sensor of " +
+                 std::to_string(info.width) + "x" + std::to_string(info.height) + " pixels: correct it in the camera's driver");
+}
+
+}  // namespace
+
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info) {
+  check_region(info);
   sensor_msgs::CameraInfo rectified = info;
   if (info.P[0] == 0) rectified.P = {info.K[0], 0, info.K[2], 0, 0, info.K[4], info.K[5], 0, 0, 0, 1, 0};
-  image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
+  Intrinsics intrinsics;
   try {
+    image_geometry::PinholeCameraModel model;  // applies binning and the region of interest
     model.fromCameraInfo(rectified);
+    const cv::Size size = model.reducedResolution();
+    intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   } catch (const std::exception& error) {
     throw BadFrame("its camera_info cannot be used (" + std::string(error.what()) + ")");
   }
-  const cv::Size size = model.reducedResolution();
-  const Intrinsics intrinsics = {model.fx(), model.fy(), model.cx(), model.cy(), size.width, size.height};
   for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy}) {
     if (!std::isfinite(number)) throw BadFrame("its camera_info is not finite");
   }

@@ -51,7 +51,8 @@ cv::Mat copy(const DepthImage& image);
 cv::Mat copy(const ColorImage& image);
 
 /// The pinhole camera that `info` describes: its rectified P where there is one, else K, with binning and region of interest applied.
-/// Width and height are 0 where the message does not state them. @throws BadFrame if a number is not finite or a focal length not positive
+/// Width and height are 0 where the message does not state them. @throws BadFrame if a number is not finite, a focal length not
+/// positive, or the region of interest not within the sensor
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info);
 
 /// The same for a depth image of `image_size` pixels. @throws BadFrame also if the message states another size

@@ -3,11 +3,12 @@
 
 #include <ros/node_handle.h>
 #include <tf2/buffer_core.h>
-#include <tf2_ros/transform_listener.h>
 
 #include <Eigen/Geometry>
 #include <optional>
 #include <string>
+
+#include "ros/input/transform_listener.hpp"
 
 namespace frontier_surfels {
 
@@ -38,7 +39,7 @@ class FramePoses {
 
   const std::string world_frame_;
   tf2::BufferCore buffer_;
-  std::optional<tf2_ros::TransformListener> listener_;
+  std::optional<TransformListener> listener_;
 };
 
 }  // namespace frontier_surfels

@@ -43,6 +43,7 @@ const char* assign(XmlRpcValue& value, std::string& field) {
 
 std::string shown(const XmlRpcValue& value) {
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text << value;
   return text.str();
 }
@@ -93,6 +94,7 @@ std::vector<std::string> NodeConfig::problems() const {
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
       if (std::is_same_v<std::decay_t<decltype(value)>, bool> || (value >= info.lowest && value <= info.highest)) return;
       std::ostringstream text;
+      text.imbue(std::locale::classic());
       text << info.name << " is " << value << " " << info.unit << ": it must be from " << info.lowest << " to " << info.highest << " "
            << info.unit << ".";
       faults.push_back(text.str());
@@ -102,6 +104,8 @@ std::vector<std::string> NodeConfig::problems() const {
     faults.push_back("world_frame is empty: it must be the tf frame in which the map does not move.");
   if (on_time_jump != "keep" && on_time_jump != "reset")
     faults.push_back("on_time_jump is '" + on_time_jump + "': it must be keep or reset.");
+  if (use_color && color_transport == "compressedDepth")
+    faults.push_back("color_transport is compressedDepth, which is for depth images: choose raw or compressed.");
   if (cloud_confidence != "frontier" && cloud_confidence != "occupied")
     faults.push_back("cloud_confidence is '" + cloud_confidence + "': it must be frontier or occupied.");
   return faults;
@@ -123,6 +127,12 @@ NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>*
     if (warnings != nullptr) warnings->push_back("There is no parameter ~" + entry.first + suggestion(entry.first, names));
   }
   return config;
+}
+
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config) {
+  const auto write = [&pnh](const FieldInfo& info, const auto& value) { pnh.setParam(info.name, value); };
+  for_each_field(config.mapper, write);
+  for_each_node_field(config, write);
 }
 
 Config read_mapper_config(const std::string& node) {

@@ -23,6 +23,7 @@ struct NodeConfig {
   double publish_period = 1.0;
   int marker_limit = 100000;
   std::string cloud_confidence = "frontier";
+  int message_limit = 16000000;
 
   /// Every fault, one sentence each, the mapper's included; empty when the configuration can be used.
   std::vector<std::string> problems() const;
@@ -35,11 +36,13 @@ struct NodeConfig {
 template <typename ConfigT, typename Visitor>
 void for_each_node_field(ConfigT& config, Visitor&& visit) {
   visit(FieldInfo{"world_frame", "", "tf frame of the map"}, config.world_frame);
-  visit(FieldInfo{"image_transport", "", "transport of the depth images: raw, compressedDepth, or any other that is installed"},
+  visit(FieldInfo{"image_transport", "",
+                  "transport of the depth images: raw, compressedDepth, or another one that is installed; else the node does not start"},
         config.image_transport);
   visit(FieldInfo{"use_color", "", "whether occupied surfels take their colour from color/image, which must be registered to depth"},
         config.use_color);
-  visit(FieldInfo{"color_transport", "", "transport of the colour images: raw, compressed, or any other that is installed"},
+  visit(FieldInfo{"color_transport", "",
+                  "transport of the colour images: raw, compressed, or another one that is installed; else the node does not start"},
         config.color_transport);
   visit(FieldInfo{"tf_timeout", "s", "how long an image waits for its pose and its camera_info", 0, 10}, config.tf_timeout);
   visit(FieldInfo{"on_time_jump", "", "what becomes of the map when time jumps back, as when a bag loops: keep or reset"},
@@ -51,12 +54,20 @@ void for_each_node_field(ConfigT& config, Visitor&& visit) {
         config.marker_limit);
   visit(FieldInfo{"cloud_confidence", "", "which surfels have confidence 1 in point clouds, all others having 0: frontier or occupied"},
         config.cloud_confidence);
+  visit(FieldInfo{"message_limit", "surfel",
+                  "maximum number of surfels in a message: larger updates come in parts; of 16 million, a message has at most 0.9 GB, "
+                  "because roscpp refuses more than 1 GB",
+                  1000, 16000000},
+        config.message_limit);
 }
 
 /// Reads all parameters in the namespace of `pnh`.
 /// @param warnings  gets a sentence for every unknown parameter there, with the known name that is most like it
 /// @throws Error with every fault: wrong types, values out of range
 NodeConfig read_parameters(const ros::NodeHandle& pnh, std::vector<std::string>* warnings);
+
+/// Sets every parameter in the namespace of `pnh` to the value that is in force, defaults included, so that `rosparam get` shows it.
+void write_parameters(const ros::NodeHandle& pnh, const NodeConfig& config);
 
 /// Reads the parameters of the mapper in a running node of this name. @throws Error with every fault
 Config read_mapper_config(const std::string& node);

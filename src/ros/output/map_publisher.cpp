@@ -57,6 +57,7 @@ void enqueue(std::deque<PushedChanges>& queue, PushedChanges pushed, std::size_t
 MapPublisher::MapPublisher(ros::NodeHandle pnh, const NodeConfig& config, std::function<void()> wake)
     : world_frame_(config.world_frame),
       confident_(config.confident_label()),
+      most_surfels_(static_cast<std::size_t>(config.message_limit)),
       period_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(config.publish_period))),
       wake_(std::move(wake)),
       markers_(config.world_frame, static_cast<std::size_t>(config.marker_limit)) {
@@ -205,17 +206,18 @@ void MapPublisher::apply_and_tell(const std::deque<PushedChanges>& queue) {
     Eigen::AlignedBox3f box;
     if (!apply(pushed, box)) return;
     touched.extend(box);
-    if (!whole) publish(kUpdate, [&] { return with_header(messages::to_message(pushed.changes, pushed.since, box, confident_)); });
+    if (!whole) publish_update({pushed.changes, pushed.since, box, confident_, most_surfels_});
   }
   if (!whole || map_.sequence() == 0) return;
   at_once_[kUpdate] = false;
-  publish(kUpdate, [&] {
-    for (const Surfel& slot : map_.slots())
-      if (exists(slot)) touched.extend(slot.position);
-    SurfelUpdate message = messages::to_message(Changes{map_.sequence(), {}, {}}, 0, touched);
-    message.surfels = messages::to_cloud(map_, confident_);
-    return with_header(std::move(message));
-  });
+  if (!is_heard(kUpdate)) return;
+  for (const Surfel& surfel : map_.slots()) touched.extend(surfel.position);
+  publish_update({map_, touched, confident_, most_surfels_});
+}
+
+/// Publishes all parts. A part that cannot be made is left out, and subscribers notice this.
+void MapPublisher::publish_update(messages::UpdateMessages update) {
+  while (!update.done() && is_heard(kUpdate) && !stopping_) publish(kUpdate, [&] { return with_header(update.next()); });
 }
 
 /// @return false if it failed; the next push will then be the whole map
@@ -284,7 +286,7 @@ void MapPublisher::publish_cloud(Topic topic) {
     const std::optional<Label> label = topic == kOccupied   ? std::make_optional(Label::kOccupied)
                                        : topic == kFrontier ? std::make_optional(Label::kFrontier)
                                                             : std::nullopt;
-    return with_header(messages::to_cloud(map_, confident_, label));
+    return with_header(messages::to_cloud(map_, confident_, label, most_surfels_));
   });
 }
 

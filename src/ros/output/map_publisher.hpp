@@ -20,6 +20,7 @@
 
 #include "ros/input/parameters.hpp"
 #include "ros/output/surfel_markers.hpp"
+#include "ros/output/surfel_messages.hpp"
 #include "ros/output/surfel_mirror.hpp"
 
 namespace frontier_surfels {
@@ -79,6 +80,7 @@ class MapPublisher {
   bool apply(const PushedChanges& pushed, Eigen::AlignedBox3f& box);
   void start_over();
   void publish_what_is_due();
+  void publish_update(messages::UpdateMessages update);
   void publish_cloud(Topic topic);
   void publish_markers();
   template <typename Make>
@@ -88,7 +90,8 @@ class MapPublisher {
   SurfelUpdate with_header(SurfelUpdate update) const;
 
   const std::string world_frame_;
-  const Label confident_;  ///< has confidence 1 in clouds
+  const Label confident_;           ///< has confidence 1 in clouds
+  const std::size_t most_surfels_;  ///< in a message
   const Clock::duration period_;
   const std::function<void()> wake_;
   std::array<ros::Publisher, kTopics> publishers_;

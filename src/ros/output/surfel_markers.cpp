@@ -81,20 +81,21 @@ void SurfelMarkers::forget() {
   indexed_ = false;
 }
 
-void SurfelMarkers::index(const std::vector<Surfel>& slots) {
+void SurfelMarkers::index(const SurfelSlots& slots) {
   blocks_.clear();
   touched_.clear();
   next_number_ = 0;
-  for (const Surfel& slot : slots)
-    if (exists(slot)) touched_block(block_key(slot)).ids.push_back(slot.id);
+  for (const Surfel& surfel : slots) touched_block(block_key(surfel)).ids.push_back(surfel.id);
   indexed_ = true;
 }
 
 /// Orders the surfels of a block by cell, removes those that are gone, and counts the squares on every level.
-void SurfelMarkers::refresh(Key key, Block& block, const std::vector<Surfel>& slots) {
+void SurfelMarkers::refresh(Key key, Block& block, const SurfelSlots& slots) {
   scratch_.clear();
-  for (const std::uint32_t id : block.ids)
-    if (id < slots.size() && exists(slots[id]) && block_key(slots[id]) == key) scratch_.emplace_back(cell_key(slots[id]), id);
+  for (const std::uint32_t id : block.ids) {
+    const Surfel* surfel = slots.find(id);
+    if (surfel != nullptr && block_key(*surfel) == key) scratch_.emplace_back(cell_key(*surfel), id);
+  }
   std::sort(scratch_.begin(), scratch_.end());
   scratch_.erase(std::unique(scratch_.begin(), scratch_.end()), scratch_.end());
 
@@ -129,7 +130,7 @@ int SurfelMarkers::fitting_level() const {
 }
 
 /// Brings all touched blocks up to date and chooses the level. @return whether the level has changed
-bool SurfelMarkers::settle_level(const std::vector<Surfel>& slots) {
+bool SurfelMarkers::settle_level(const SurfelSlots& slots) {
   for (bool changed = false;; changed = true) {
     for (const Key key : touched_) {
       Block& block = blocks_.at(key);
@@ -145,11 +146,11 @@ bool SurfelMarkers::settle_level(const std::vector<Surfel>& slots) {
   }
 }
 
-std::array<MarkerSquares, 2> SurfelMarkers::squares_of(const Block& block, const std::vector<Surfel>& slots) const {
+std::array<MarkerSquares, 2> SurfelMarkers::squares_of(const Block& block, const SurfelSlots& slots) const {
   std::array<MarkerSquares, 2> squares;
   const auto add = [&](const Surfel& surfel) { squares[namespace_of(surfel.label)].add(surfel); };
   if (level_ == 0) {
-    for (const std::uint32_t id : block.ids) add(slots[id]);
+    for (const std::uint32_t id : block.ids) add(*slots.find(id));
     return squares;
   }
   MergedSurfels merged;
@@ -158,14 +159,13 @@ std::array<MarkerSquares, 2> SurfelMarkers::squares_of(const Block& block, const
       add(merged.mean(cell() / 2));
       merged = MergedSurfels();
     }
-    merged.add(slots[block.ids[i]]);
+    merged.add(*slots.find(block.ids[i]));
   }
   if (!block.ids.empty()) add(merged.mean(cell() / 2));
   return squares;
 }
 
-void SurfelMarkers::send(Block& block, const std::vector<Surfel>& slots, const std_msgs::Header& header,
-                         visualization_msgs::MarkerArray& message) {
+void SurfelMarkers::send(Block& block, const SurfelSlots& slots, const std_msgs::Header& header, visualization_msgs::MarkerArray& message) {
   std::array<MarkerSquares, 2> squares = squares_of(block, slots);
   for (std::size_t label = 0; label < squares.size(); ++label) {
     const bool wanted = !squares[label].points.empty();

@@ -62,13 +62,13 @@ class SurfelMarkers {
   Key block_key(const Surfel& surfel) const;
   Key cell_key(const Surfel& surfel) const;
   Block& touched_block(Key key);
-  void index(const std::vector<Surfel>& slots);
-  void refresh(Key key, Block& block, const std::vector<Surfel>& slots);
+  void index(const SurfelSlots& slots);
+  void refresh(Key key, Block& block, const SurfelSlots& slots);
   std::size_t total(int level) const;
   int fitting_level() const;
-  bool settle_level(const std::vector<Surfel>& slots);
-  std::array<MarkerSquares, 2> squares_of(const Block& block, const std::vector<Surfel>& slots) const;
-  void send(Block& block, const std::vector<Surfel>& slots, const std_msgs::Header& header, visualization_msgs::MarkerArray& message);
+  bool settle_level(const SurfelSlots& slots);
+  std::array<MarkerSquares, 2> squares_of(const Block& block, const SurfelSlots& slots) const;
+  void send(Block& block, const SurfelSlots& slots, const std_msgs::Header& header, visualization_msgs::MarkerArray& message);
 
   std::string world_frame_;
   std::size_t limit_;

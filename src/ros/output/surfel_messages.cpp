@@ -17,6 +17,7 @@ namespace {
 using sensor_msgs::PointCloud2;
 using sensor_msgs::PointField;
 
+const std::vector<std::uint32_t> kNone;
 constexpr bool kThisMachineIsBigEndian = BOOST_ENDIAN_BIG_BYTE;
 
 /// A surfel in a cloud: pcl::PointSurfel with id and label in its gaps.
@@ -74,11 +75,9 @@ Surfel to_surfel(const Point& point) {
   return s;
 }
 
-/// A cloud of the surfels that `wanted` picks. @param count  number of them
-template <typename Wanted>
-PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Label confident, Wanted wanted) {
-  if (count > kMostSurfels)
-    throw Error(std::to_string(count) + " surfels are more than a PointCloud2 can hold: map with a larger decimation, or reset.");
+/// A cloud of `count` surfels. @param next  returns one after the other
+template <typename Next>
+PointCloud2 pack(std::size_t count, Label confident, const Next& next) {
   PointCloud2 cloud;
   for (const Field& field : kFields) {
     cloud.fields.emplace_back();
@@ -103,14 +102,25 @@ PointCloud2 pack(const std::vector<Surfel>& surfels, std::size_t count, Label co
     cloud.data.insert(cloud.data.end(), bytes, bytes + filled * sizeof(Point));
     filled = 0;
   };
-  for (const Surfel& surfel : surfels) {
-    if (!wanted(surfel)) continue;
-    points[filled++] = to_point(surfel, confident);
+  for (std::size_t n = 0; n < count; ++n) {
+    points[filled++] = to_point(next(), confident);
     if (filled == points.size()) flush();
   }
   flush();
   return cloud;
 }
+
+/// @throws Error if this number of surfels does not go into a message
+void check_count(std::size_t count, std::size_t most) {
+  if (count <= most) return;
+  throw Error(
+      std::to_string(count) + " surfels are more than a message may have (" + std::to_string(most) +
+      ", see ~message_limit): call ~get_surfels with smaller boxes, or with `most` and `first_id` for parts, or subscribe ~update, " +
+      "which brings the whole map in parts.");
+}
+
+/// Number of messages for this number of things.
+std::size_t messages_for(std::size_t count, std::size_t most) { return (count + most - 1) / most; }
 
 std::size_t find_offset(const PointCloud2& cloud, const Field& field) {
   const std::string name = field.name;
@@ -149,14 +159,20 @@ std::uint32_t count32(std::size_t count) {
 
 }  // namespace
 
-PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident) {
-  return pack(surfels, surfels.size(), confident, [](const Surfel&) { return true; });
+PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident, std::size_t most) {
+  check_count(surfels.size(), most);
+  auto at = surfels.begin();
+  return pack(surfels.size(), confident, [&]() -> const Surfel& { return *at++; });
 }
 
-PointCloud2 to_cloud(const SurfelMirror& map, Label confident, std::optional<Label> only) {
-  if (!only) return pack(map.slots(), map.size(), confident, exists);
-  const std::size_t count = *only == Label::kOccupied ? map.occupied() : map.size() - map.occupied();
-  return pack(map.slots(), count, confident, [label = *only](const Surfel& s) { return exists(s) && s.label == label; });
+PointCloud2 to_cloud(const SurfelMirror& map, Label confident, std::optional<Label> only, std::size_t most) {
+  const std::size_t count = !only ? map.size() : *only == Label::kOccupied ? map.occupied() : map.size() - map.occupied();
+  check_count(count, most);
+  auto at = map.slots().begin();
+  return pack(count, confident, [&]() -> const Surfel& {
+    while (only && at->label != *only) ++at;
+    return *at++;
+  });
 }
 
 std::vector<Surfel> to_surfels(const PointCloud2& cloud) {
@@ -178,14 +194,57 @@ std::vector<Surfel> to_surfels(const PointCloud2& cloud) {
   return surfels;
 }
 
-SurfelUpdate to_message(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box, Label confident) {
+UpdateMessages::UpdateMessages(const Changes& changes, std::uint64_t since, const Eigen::AlignedBox3f& box, Label confident,
+                               std::size_t most)
+    : sequence_(changes.sequence),
+      since_(since),
+      next_surfel_([at = changes.updated.begin()]() mutable -> const Surfel& {
+        while (!exists(*at)) ++at;
+        return *at++;
+      }),
+      removed_(changes.removed),
+      box_(box),
+      confident_(confident),
+      most_(most),
+      surfels_left_(static_cast<std::size_t>(std::count_if(changes.updated.begin(), changes.updated.end(), exists))) {
+  count_parts();
+}
+
+UpdateMessages::UpdateMessages(const SurfelMirror& map, const Eigen::AlignedBox3f& box, Label confident, std::size_t most)
+    : sequence_(map.sequence()),
+      since_(0),
+      next_surfel_([at = map.slots().begin()]() mutable -> const Surfel& { return *at++; }),
+      removed_(kNone),
+      box_(box),
+      confident_(confident),
+      most_(most),
+      surfels_left_(map.size()) {
+  count_parts();
+}
+
+/// The last message with removed ids is the first one with surfels.
+void UpdateMessages::count_parts() {
+  const std::size_t before = removed_.empty() ? 0 : messages_for(removed_.size(), most_) - 1;
+  parts_ = static_cast<std::uint32_t>(before + std::max<std::size_t>(messages_for(surfels_left_, most_), 1));
+}
+
+SurfelUpdate UpdateMessages::next() {
   SurfelUpdate message;
-  message.sequence = changes.sequence;
-  message.since = since;
-  message.surfels = to_cloud(changes.updated, confident);
-  message.removed = changes.removed;
-  message.box_min = to_message(box.min());
-  message.box_max = to_message(box.max());
+  message.sequence = sequence_;
+  message.since = since_;
+  message.part = part_++;
+  message.parts = parts_;
+  message.box_min = to_message(box_.min());
+  message.box_max = to_message(box_.max());
+
+  const std::size_t removed_end = std::min(removed_.size(), removed_sent_ + most_);
+  message.removed.assign(removed_.begin() + static_cast<std::ptrdiff_t>(removed_sent_),
+                         removed_.begin() + static_cast<std::ptrdiff_t>(removed_end));
+  removed_sent_ = removed_end;
+
+  const std::size_t count = removed_sent_ == removed_.size() ? std::min(surfels_left_, most_) : 0;
+  message.surfels = pack(count, confident_, next_surfel_);
+  surfels_left_ -= count;
   return message;
 }
 

@@ -9,21 +9,11 @@ namespace {
 
 bool by_id(const Surfel& a, const Surfel& b) { return a.id < b.id; }
 
-/// The number of slots that the changes need. @throws Error if an id is impossible
-std::size_t slots_for(const Changes& changes) {
-  std::size_t slots = 0;
-  for (const Surfel& surfel : changes.updated) slots = std::max(slots, std::size_t{surfel.id} + 1);
-  if (slots > kMostSurfels)
-    throw Error("The changes of the map are damaged: no surfel has the id " + std::to_string(slots - 1) + "; ask for the whole map.");
-  return slots;
-}
-
 template <typename Wanted>
-std::vector<Surfel> pick(const std::vector<Surfel>& slots, std::size_t most, Wanted wanted) {
+std::vector<Surfel> pick(const SurfelSlots& slots, std::size_t most, Wanted wanted) {
   std::vector<Surfel> surfels;
   surfels.reserve(most);
-  for (const Surfel& slot : slots)
-    if (exists(slot) && wanted(slot)) surfels.push_back(slot);
+  std::copy_if(slots.begin(), slots.end(), std::back_inserter(surfels), wanted);
   return surfels;
 }
 
@@ -57,9 +47,7 @@ Eigen::AlignedBox3f SurfelMirror::apply(const Changes& changes, std::uint64_t si
   if (since != 0 && since != sequence_)
     throw Error("The changes begin at number " + std::to_string(since) + ", but the copy of the map is of number " +
                 std::to_string(sequence_) + ": ask for the whole map.");
-  const std::size_t slots = slots_for(changes);
-  if (slots > slots_.size()) slots_.resize(slots);
-
+  for (const Surfel& surfel : changes.updated) slots_.at(surfel.id);  // memory may run out: before anything changes
   Eigen::AlignedBox3f box;
   const auto remove = [&](Surfel& slot) {
     if (!exists(slot)) return;
@@ -69,11 +57,13 @@ Eigen::AlignedBox3f SurfelMirror::apply(const Changes& changes, std::uint64_t si
     occupied_ -= slot.label == Label::kOccupied;
     slot.radius = 0;
   };
-  if (since == 0) std::for_each(slots_.begin(), slots_.end(), remove);
+  if (since == 0) {
+    for (const Surfel& surfel : slots_) remove(*slots_.find(surfel.id));
+  }
   for (const std::uint32_t id : changes.removed)
-    if (id < slots_.size()) remove(slots_[id]);
+    if (Surfel* slot = slots_.find(id)) remove(*slot);
   for (const Surfel& surfel : changes.updated) {
-    Surfel& slot = slots_[surfel.id];
+    Surfel& slot = slots_.at(surfel.id);
     remove(slot);
     if (!exists(surfel)) continue;
     slot = surfel;
@@ -111,14 +101,9 @@ Changes merge(Changes earlier, Changes later) {
   merged.updated.reserve(kept.size() + later.updated.size());
   std::set_union(later.updated.begin(), later.updated.end(), kept.begin(), kept.end(), std::back_inserter(merged.updated), by_id);
 
-  std::vector<std::uint32_t> removed;
-  removed.reserve(earlier.removed.size() + later.removed.size());
-  std::set_union(earlier.removed.begin(), earlier.removed.end(), later.removed.begin(), later.removed.end(), std::back_inserter(removed));
-  auto surfel = merged.updated.begin();
-  for (const std::uint32_t id : removed) {
-    while (surfel != merged.updated.end() && surfel->id < id) ++surfel;
-    if (surfel == merged.updated.end() || surfel->id != id) merged.removed.push_back(id);
-  }
+  merged.removed.reserve(earlier.removed.size() + later.removed.size());
+  std::set_union(earlier.removed.begin(), earlier.removed.end(), later.removed.begin(), later.removed.end(),
+                 std::back_inserter(merged.removed));
   return merged;
 }
 

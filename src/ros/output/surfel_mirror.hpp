@@ -7,17 +7,15 @@
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
+#include "ros/output/surfel_slots.hpp"
 
 namespace frontier_surfels {
 
 /// Size of a surfel in a PointCloud2 [byte].
 constexpr std::size_t kBytesOfSurfel = 48;
 
-/// Maximum number of surfels in a PointCloud2. An id that is not below it must be damaged.
+/// Maximum number of surfels in a PointCloud2.
 constexpr std::size_t kMostSurfels = 0xffffffffu / kBytesOfSurfel;
-
-/// Whether there is a surfel in a slot of SurfelMirror.
-inline bool exists(const Surfel& slot) { return slot.radius != 0; }
 
 /// Contains no ROS and no locks.
 class SurfelMirror {
@@ -32,7 +30,7 @@ class SurfelMirror {
 
   /// Applies the changes since the number `since`, which must be sequence(), or 0 if the changes contain the whole map.
   /// @return the box around the centres of all surfels that go or come; empty if there are none
-  /// @throws Error if `since` is another number or an id is impossible; the copy is then as before
+  /// @throws Error if `since` is another number; the copy is then as before
   Eigen::AlignedBox3f apply(const Changes& changes, std::uint64_t since, const Visit& visit = {});
 
   /// All surfels, ordered by id.
@@ -42,16 +40,17 @@ class SurfelMirror {
   /// The surfels whose centre lies in the box, ordered by id.
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
 
-  /// Surfels by id, from 0 to the highest id. Slots without a surfel have radius 0.
-  const std::vector<Surfel>& slots() const { return slots_; }
+  /// All surfels, by id.
+  const SurfelSlots& slots() const { return slots_; }
 
  private:
   std::uint64_t sequence_ = 0;
   std::size_t size_ = 0, occupied_ = 0;
-  std::vector<Surfel> slots_;
+  SurfelSlots slots_;
 };
 
-/// Two changes that follow each other as one. If both name a surfel, the later ones count. Surfels and ids are ordered.
+/// Two changes that follow each other as one. If both name a surfel, the later ones count. An id that was removed and then given to another
+/// surfel is both removed and updated. Surfels and ids are ordered.
 Changes merge(Changes earlier, Changes later);
 
 }  // namespace frontier_surfels

@@ -1,0 +1,42 @@
+/// Counts the depths of an image that the mapper can use, and the others by their fault.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include "frontier_surfels/config.hpp"
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels {
+
+/// Number of the pixels that the mapper reads, by what they are. Depths that only carve free space are usable.
+struct DepthCensus {
+  std::size_t usable = 0;
+  std::size_t missing = 0;                                 ///< 0, NaN or negative
+  std::size_t saturated = 0;                               ///< 65535 in a 16-bit image
+  std::size_t too_near = 0;                                ///< below z_min
+  std::size_t too_far = 0;                                 ///< beyond z_max
+  bool in_metres = false;                                  ///< 32-bit image
+  float nearest = std::numeric_limits<float>::infinity();  ///< smallest depth, usable or not [m]
+  float farthest = 0;                                      ///< largest finite depth, usable or not [m]
+
+  std::size_t measured() const { return usable + saturated + too_near + too_far; }
+
+  /// Why no pixel is usable: no_measurement, saturated, too_near, too_far or out_of_range; empty if some pixel is usable.
+  std::string reason() const;
+
+  /// Adds the counts of another image.
+  DepthCensus& operator+=(const DepthCensus& other);
+};
+
+/// @param image  with data and a valid size
+DepthCensus count_depths(const DepthImage& image, const Config& config);
+
+/// "z_min = 0.4 m to z_max = 3 m", for messages.
+std::string depth_range(const Config& config);
+
+/// End of a sentence about depths out of range, whose unit may be wrong: "from 20 to 60 m: 16-bit images are read in steps of ...".
+std::string range_and_remedy(const DepthCensus& depths, const Config& config);
+
+}  // namespace frontier_surfels

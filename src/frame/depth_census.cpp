@@ -1,0 +1,95 @@
+#include "frontier_surfels/depth_census.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "frame/depth_pixels.hpp"
+#include "frontier_surfels/number_text.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
+
+std::string number(double value) { return rounded_text(value, 3); }
+
+void count_depth(float depth, const Config& config, DepthCensus& census) {
+  if (std::isnan(depth) || depth <= 0) {
+    ++census.missing;
+    return;
+  }
+  census.nearest = std::min(census.nearest, depth);
+  if (std::isfinite(depth)) census.farthest = std::max(census.farthest, depth);
+  const bool carves = std::isinf(depth) ? config.carve_no_return : config.carve_beyond_range && depth < kImplausible;
+  if (depth < static_cast<float>(config.z_min)) {
+    ++census.too_near;
+  } else if (depth <= static_cast<float>(config.z_max) || carves) {
+    ++census.usable;
+  } else {
+    ++census.too_far;
+  }
+}
+
+template <typename Pixel>
+void count_pixels(const DepthImage& image, const Config& config, DepthCensus& census) {
+  for_each_pixel<Pixel>(image, config.decimation, [&](Pixel pixel) {
+    if (sizeof(Pixel) == 2 && pixel == kSaturated) {
+      ++census.saturated;
+    } else {
+      count_depth(to_metres(pixel, config.depth_unit), config, census);
+    }
+  });
+}
+
+}  // namespace
+
+std::string DepthCensus::reason() const {
+  if (usable > 0) return {};
+  if (measured() == 0) return "no_measurement";
+  if (saturated == measured()) return "saturated";
+  if (too_near > 0 && too_far == 0) return "too_near";
+  if (too_far > 0 && too_near == 0) return "too_far";
+  return "out_of_range";
+}
+
+DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
+  usable += other.usable;
+  missing += other.missing;
+  saturated += other.saturated;
+  too_near += other.too_near;
+  too_far += other.too_far;
+  in_metres = other.in_metres;
+  nearest = std::min(nearest, other.nearest);
+  farthest = std::max(farthest, other.farthest);
+  return *this;
+}
+
+std::string depth_range(const Config& config) { return "z_min = " + number(config.z_min) + " m to z_max = " + number(config.z_max) + " m"; }
+
+std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
+  if (depths.farthest == 0)  // none is finite
+    return "of +Inf, which means no surface within the camera's range: go nearer, or set carve_no_return to take them for free space.";
+  std::string text = "from " + number(depths.nearest) + " to " + number(depths.farthest) + " m: ";
+  if (!depths.in_metres) {
+    text += "16-bit images are read in steps of depth_unit = " + number(config.depth_unit) + " m, so correct depth_unit";
+  } else if (depths.farthest >= kImplausible) {
+    return text + "32-bit images must be in metres, but these look like millimetres, so divide them by 1000, or use 16UC1.";
+  } else {
+    text += "32-bit images must be in metres, so correct their unit";
+  }
+  return text + ", or change z_min and z_max.";
+}
+
+DepthCensus count_depths(const DepthImage& image, const Config& config) {
+  DepthCensus census;
+  census.in_metres = image.encoding == DepthImage::Encoding::kMetresF32;
+  if (census.in_metres) {
+    count_pixels<std::uint32_t>(image, config, census);
+  } else {
+    count_pixels<std::uint16_t>(image, config, census);
+  }
+  return census;
+}
+
+}  // namespace frontier_surfels

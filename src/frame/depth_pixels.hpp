@@ -1,0 +1,42 @@
+/// How the pixels of depth images are read: the mapper, and what counts their faults, must agree.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels {
+
+/// Value of a 16-bit pixel that sensors write, as they write 0, where they have measured nothing.
+constexpr std::uint16_t kSaturated = 65535;
+
+inline std::uint16_t swapped(std::uint16_t value) { return __builtin_bswap16(value); }
+inline std::uint32_t swapped(std::uint32_t value) { return __builtin_bswap32(value); }
+
+/// Depth of a 16-bit pixel [m]; 0: no measurement. @param depth_unit  Config::depth_unit
+inline float to_metres(std::uint16_t steps, double depth_unit) { return steps == kSaturated ? 0 : static_cast<float>(steps * depth_unit); }
+
+/// Depth of a pixel whose bits are a float [m].
+inline float to_metres(std::uint32_t bits, double /*depth_unit*/) {
+  float metres;
+  std::memcpy(&metres, &bits, sizeof(metres));
+  return metres;
+}
+
+/// Calls visit(pixel) for the upper left pixel of every whole block of decimation x decimation pixels, row by row.
+/// @tparam Pixel  unsigned integer of the image's pixel size
+template <typename Pixel, typename Visit>
+void for_each_pixel(const DepthImage& image, int decimation, Visit visit) {
+  const int width = image.width / decimation, height = image.height / decimation;
+  for (int t = 0; t < height; ++t) {
+    const auto* row = static_cast<const std::uint8_t*>(image.data) + t * decimation * image.step;
+    for (int s = 0; s < width; ++s, row += decimation * sizeof(Pixel)) {
+      Pixel pixel;
+      std::memcpy(&pixel, row, sizeof(pixel));
+      visit(image.swap_bytes ? swapped(pixel) : pixel);
+    }
+  }
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,65 @@
+#include "replay/report_folder.hpp"
+
+#include <fstream>
+#include <string>
+#include <system_error>
+
+#include "frontier_surfels/types.hpp"
+
+namespace frontier_surfels::replay {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kFiles[] = {"summary.json", "frames.csv",   "trajectory.txt", "surfels.ply",
+                                  "octomap.ply",  "verdicts.bin", "sweep.json",     "report.html"};
+
+/// Removes the files of a report, and nothing else.
+void remove_files(const fs::path& folder) {
+  std::error_code ignored;
+  for (const char* name : kFiles) fs::remove(folder / name, ignored);
+}
+
+bool can_be_written(const fs::path& folder) {
+  const fs::path probe = folder / kFiles[0];
+  std::error_code ignored;
+  const bool written = static_cast<bool>(std::ofstream(probe));
+  fs::remove(probe, ignored);
+  return written;
+}
+
+}  // namespace
+
+ReportFolder::ReportFolder(const fs::path& folder) : folder_(folder), unfinished_(folder / "unfinished_report") {
+  std::error_code error;
+  is_new_ = !fs::exists(folder_, error);
+  fs::create_directories(folder_, error);
+  fs::create_directory(unfinished_, error);
+  if (!fs::is_directory(unfinished_, error) || !can_be_written(unfinished_)) {
+    throw FileError("The report's folder '" + folder_.string() + "' cannot be made or written: choose another with --report.");
+  }
+  remove_files(unfinished_);  // of a run that was killed
+}
+
+ReportFolder::~ReportFolder() {
+  std::error_code ignored;
+  remove_files(unfinished_);
+  fs::remove(unfinished_, ignored);
+  if (is_new_) fs::remove(folder_, ignored);  // does nothing if there are files in it
+}
+
+void ReportFolder::commit() {
+  std::error_code error, absent;
+  for (const char* name : kFiles) {
+    if (fs::exists(unfinished_ / name)) {
+      fs::rename(unfinished_ / name, folder_ / name, error);
+    } else {
+      fs::remove(folder_ / name, absent);
+    }
+    if (error) {
+      throw FileError("'" + (folder_ / name).string() + "' cannot be replaced (" + error.message() +
+                      "): check that the folder and its files are yours.");
+    }
+  }
+}
+
+}  // namespace frontier_surfels::replay

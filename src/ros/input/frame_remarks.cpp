@@ -1,0 +1,79 @@
+#include "ros/input/frame_remarks.hpp"
+
+#include <algorithm>
+
+#include "frontier_surfels/depth_census.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr double kStillDistance = 1e-4;       // [m], below the noise of any tracked pose
+constexpr double kStillRotation = 1e-4;       // largest difference of a rotation matrix' elements
+constexpr std::size_t kAlternatingSizes = 4;  // a camera whose mode is changed to and fro has fewer
+
+std::string size_text(const std::pair<int, int>& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
+
+}  // namespace
+
+std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now) {
+  std::string all = about_pixels(frame.depth);
+  if (!all.empty() && pixel_warnings_.is_due(now)) warn_(all);
+  for (const std::string& remark : {about_distortion(info), about_size(frame.depth), about_motion(frame.T_world_camera)}) {
+    if (remark.empty()) continue;
+    warn_(remark);
+    all += (all.empty() ? "" : " ") + remark;
+  }
+  return all;
+}
+
+std::string FrameRemarks::about_pixels(const DepthImage& image) const {
+  const DepthCensus depths = count_depths(image, config_);
+  if (depths.usable > 0) return {};
+  if (depths.measured() == 0)
+    return "The depth image has no measurement in any pixel (0 or NaN): check that the camera delivers depth and is not covered, and that "
+           "depth/image is remapped to the right topic.";
+  if (depths.saturated == depths.measured())
+    return "The depth image is 65535 in every pixel that is not 0, which means no measurement: check the camera and its driver.";
+  return "The depth image has no depth from " + depth_range(config_) + ", only depths " + range_and_remedy(depths, config_);
+}
+
+std::string FrameRemarks::about_distortion(const sensor_msgs::CameraInfo& info) {
+  const bool distorts = std::any_of(info.D.begin(), info.D.end(), [](double coefficient) { return coefficient != 0; });
+  if (distortion_told_ || info.P[0] != 0 || !distorts) return {};
+  distortion_told_ = true;
+  return "The camera_info has distortion, but no P: the depth images are taken as rectified, with K. If they are not, remap depth/image to "
+         "rectified ones, as those of image_proc, or calibrate the camera.";
+}
+
+std::string FrameRemarks::about_size(const DepthImage& image) {
+  const std::pair<int, int> size(image.width, image.height);
+  if (!sizes_.empty() && sizes_.back() == size) return {};
+  sizes_.push_back(size);
+  if (sizes_.size() > kAlternatingSizes) sizes_.pop_front();
+  if (sizes_told_ || sizes_.size() < kAlternatingSizes || sizes_[0] != sizes_[2] || sizes_[1] != sizes_[3]) return {};
+  sizes_told_ = true;
+  return "Depth images of " + size_text(sizes_[0]) + " and of " + size_text(sizes_[1]) +
+         " pixels alternate: do two cameras publish on the topic? Remap depth/image and depth/camera_info to the topics of one camera.";
+}
+
+std::string FrameRemarks::about_motion(const Eigen::Isometry3d& T_world_camera) {
+  if (motion_told_) return {};
+  if (!T_world_first_) T_world_first_ = T_world_camera;
+  const bool still = (T_world_camera.translation() - T_world_first_->translation()).norm() <= kStillDistance &&
+                     (T_world_camera.linear() - T_world_first_->linear()).cwiseAbs().maxCoeff() <= kStillRotation;
+  moved_ = moved_ || !still;
+  if (moved_ || ++still_frames_ < kStillFrames) return {};
+  motion_told_ = true;
+  return "The camera has not moved in " + std::to_string(kStillFrames) +
+         " frames: if it did move, tf lacks the transform that moves. Publish it (odometry or localisation), or choose another "
+         "~world_frame.";
+}
+
+void FrameRemarks::forget() {
+  sizes_.clear();
+  T_world_first_.reset();
+  still_frames_ = 0;
+  moved_ = false;
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,120 @@
+/// What is said about frames from which nothing or a wrong map may come.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "ros/bag_input.hpp"
+#include "ros/input/frame_remarks.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+using replay::info_message;
+using std::chrono::seconds;
+
+class Remarks : public testing::Test {
+ protected:
+  /// The remarks about a frame whose pixels are all the same.
+  template <typename Pixel>
+  std::string on(Pixel pixel, int width = 8, double x = 0) {
+    return about(remarks_, pixel, width, x);
+  }
+
+  template <typename Pixel>
+  std::string about(FrameRemarks& remarks, Pixel pixel, int width = 8, double x = 0) const {
+    const std::vector<Pixel> pixels(static_cast<std::size_t>(width) * 8, pixel);
+    DepthFrame frame;
+    frame.depth.data = pixels.data();
+    frame.depth.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
+    frame.depth.width = width;
+    frame.depth.height = 8;
+    frame.depth.step = sizeof(Pixel) * static_cast<std::size_t>(width);
+    frame.T_world_camera = Eigen::Translation3d(x, 0, 0) * Eigen::Isometry3d::Identity();
+    return remarks.on(frame, info_, now_);
+  }
+
+  std::string on_millimetres(int value) { return on(static_cast<std::uint16_t>(value)); }
+
+  static bool says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+  std::vector<std::string> warned_;
+  Config config_;
+  FrameRemarks remarks_{config_, [this](const std::string& remark) { warned_.push_back(remark); }};
+  sensor_msgs::CameraInfo info_ = info_message(1);
+  Throttle::Clock::time_point now_;
+};
+
+TEST_F(Remarks, NoneAboutUsualFrames) {
+  EXPECT_EQ(on_millimetres(1500), "");
+  EXPECT_EQ(on(1.5F), "");
+  EXPECT_TRUE(warned_.empty());
+}
+
+TEST_F(Remarks, ImagesWithoutAUsablePixelHaveTheLikelyCause) {
+  EXPECT_TRUE(says(on_millimetres(0), "no measurement in any pixel"));
+  EXPECT_TRUE(says(on(std::numeric_limits<float>::quiet_NaN()), "no measurement in any pixel"));
+  EXPECT_TRUE(says(on_millimetres(65535), "65535"));
+  EXPECT_TRUE(says(on_millimetres(2), "depth_unit"));
+  EXPECT_TRUE(says(on_millimetres(20000), "20 m: 16-bit images are read in steps of depth_unit = 0.001 m"));
+  EXPECT_TRUE(says(on(1500.0F), "look like millimetres"));
+  EXPECT_TRUE(says(on(7.0F), "z_max"));
+}
+
+TEST_F(Remarks, MillimetresAreNotTakenForFreeSpace) {
+  config_.carve_beyond_range = true;
+  FrameRemarks carving(config_, [](const std::string&) {});
+  EXPECT_TRUE(says(about(carving, 1500.0F), "look like millimetres"));
+  EXPECT_EQ(about(carving, 7.0F), "");
+}
+
+TEST_F(Remarks, EveryUnusableImageHasAReasonAndFewAreWarnedOf) {
+  for (int n = 0; n < 5; ++n) EXPECT_NE(on_millimetres(0), "");
+  EXPECT_EQ(warned_.size(), 1U);
+  now_ += seconds(11);
+  EXPECT_NE(on_millimetres(0), "");
+  EXPECT_EQ(warned_.size(), 2U);
+}
+
+TEST_F(Remarks, DistortionWithoutPIsToldOnce) {
+  info_.D = {0.1, 0, 0, 0, 0};
+  info_.P = {5, 0, 2, 0, 0, 6, 1, 0, 0, 0, 1, 0};
+  EXPECT_EQ(on_millimetres(1500), "");
+  info_.P.fill(0);
+  EXPECT_TRUE(says(on_millimetres(1500), "taken as rectified"));
+  EXPECT_EQ(on_millimetres(1500), "");
+  EXPECT_EQ(warned_.size(), 1U);
+}
+
+TEST_F(Remarks, NoDistortionNeedsNoP) {
+  info_.D.assign(5, 0.0);
+  info_.P.fill(0);
+  EXPECT_EQ(on_millimetres(1500), "");
+}
+
+TEST_F(Remarks, AlternatingSizesAreToldOnce) {
+  std::string all;
+  for (int n = 0; n < 10; ++n) all += on<std::uint16_t>(1500, n % 2 == 0 ? 8 : 12);
+  EXPECT_TRUE(says(all, "8x8 and of 12x8 pixels alternate"));
+  EXPECT_EQ(warned_.size(), 1U);
+}
+
+TEST_F(Remarks, ACameraMayChangeItsSize) {
+  for (const int width : {8, 8, 12, 12, 8, 8, 16, 16, 12, 12}) EXPECT_EQ(on<std::uint16_t>(1500, width), "");
+}
+
+TEST_F(Remarks, ACameraThatNeverMovesIsToldOnce) {
+  for (int n = 1; n < FrameRemarks::kStillFrames; ++n) ASSERT_EQ(on_millimetres(1500), "") << n;
+  EXPECT_TRUE(says(on_millimetres(1500), "tf lacks the transform that moves"));
+  for (int n = 0; n < 2 * FrameRemarks::kStillFrames; ++n) ASSERT_EQ(on_millimetres(1500), "");
+  EXPECT_EQ(warned_.size(), 1U);
+}
+
+TEST_F(Remarks, ACameraThatHasMovedMayRest) {
+  EXPECT_EQ(on<std::uint16_t>(1500, 8, 0.01), "");
+  for (int n = 0; n < 2 * FrameRemarks::kStillFrames; ++n) ASSERT_EQ(on_millimetres(1500), "");
+}
+
+}  // namespace
+}  // namespace frontier_surfels

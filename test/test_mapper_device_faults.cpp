@@ -1,0 +1,247 @@
+/// A device that fails at any of its calls: the frame is refused with a sentence, the map stays as it was, and the same frame then gives
+/// the map that it would have given without the failure.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+
+#include "frontier_surfels/map_file.hpp"
+#include "mapper_input.hpp"
+#include "opencl/fault_injection.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+Intrinsics small_camera() { return replay::synthetic_camera(40, 30); }
+
+constexpr std::size_t kForEver = std::numeric_limits<std::size_t>::max();
+
+std::uint64_t frame_before(const Mapper& mapper) { return mapper.sequence() == 0 ? 0 : mapper.sequence() - 1; }
+
+/// All that a user sees of a map. Ids depend on who follows the changes: compare only mappers that have been looked at equally often.
+struct Seen {
+  explicit Seen(const Mapper& mapper)
+      : surfels(mapper.surfels()), last(mapper.changes(frame_before(mapper))), all(mapper.changes(0)), size(mapper.size()) {}
+
+  std::vector<Surfel> surfels;
+  Changes last, all;
+  std::size_t size;
+};
+
+testing::AssertionResult same(const Changes& a, const Changes& b) {
+  if (a.sequence != b.sequence) return testing::AssertionFailure() << "sequence " << a.sequence << " against " << b.sequence;
+  if (a.removed != b.removed)
+    return testing::AssertionFailure() << a.removed.size() << " removed surfels against " << b.removed.size() << ", or others";
+  return same(a.updated, b.updated);
+}
+
+void expect_same(const Seen& a, const Seen& b) {
+  EXPECT_TRUE(same(a.surfels, b.surfels));
+  EXPECT_TRUE(same(a.last, b.last)) << "changes of the last frame";
+  EXPECT_TRUE(same(a.all, b.all)) << "all changes";
+  EXPECT_EQ(a.size, b.size);
+}
+
+class MapperDeviceFaults : public testing::Test {
+ protected:
+  ~MapperDeviceFaults() override { FaultInjection::stop(); }
+
+  /// Error of an integration in which the device fails; "" if nothing fails.
+  static std::string refusal(Mapper& mapper, const replay::RecordedFrame& frame, std::size_t passing, std::size_t failing) {
+    FaultInjection::fail(passing, failing);
+    return fault_of<DeviceError>([&] { mapper.integrate(frame.view()); });
+  }
+
+  /// A mapper of the first frames, whose changes are followed.
+  static std::unique_ptr<Mapper> begin(const Config& config, const Frames& frames, std::size_t count) {
+    FaultInjection::stop();
+    auto mapper = std::make_unique<Mapper>(config);
+    for (std::size_t n = 0; n < count; ++n) {
+      mapper->changes(frame_before(*mapper));
+      mapper->integrate(frames[n].view());
+    }
+    return mapper;
+  }
+
+  /// Lets every call of frame `at` fail once, each in a new mapper. @return number of calls
+  static std::size_t fail_everywhere(const Config& config, const Frames& frames, std::size_t at, const Report& wanted) {
+    const auto undisturbed = begin(config, frames, at), counted = begin(config, frames, at);
+    FaultInjection::stop();
+    const Report report = counted->integrate(frames[at].view());
+    const std::size_t calls = FaultInjection::count();
+    EXPECT_GE(report.split, wanted.split);
+    EXPECT_GE(report.removed, wanted.removed);
+    EXPECT_GE(report.created, wanted.created);
+    const Seen before(*undisturbed);
+    undisturbed->integrate(frames[at].view());
+    const Seen after(*undisturbed);
+    undisturbed->integrate(frames[at + 1].view());
+    const Seen later(*undisturbed);
+    for (std::size_t n = 0; n < calls && !testing::Test::HasFailure(); ++n) {
+      SCOPED_TRACE("call " + std::to_string(n) + " of " + std::to_string(calls));
+      const auto mapper = begin(config, frames, at);
+      const std::string said = refusal(*mapper, frames[at], n, 1);
+      FaultInjection::stop();
+      EXPECT_NE(said.find("CL_"), std::string::npos) << said;
+      EXPECT_EQ(said.back(), '.') << said;
+      expect_same(Seen(*mapper), before);
+      mapper->integrate(frames[at].view());
+      expect_same(Seen(*mapper), after);
+      mapper->integrate(frames[at + 1].view());
+      expect_same(Seen(*mapper), later);
+    }
+    return calls;
+  }
+};
+
+/// A camera that comes nearer: surfels are split.
+Frames approach() {
+  const Eigen::Vector3d forward(0, 1, 0);
+  Frames frames;
+  for (const double depth : {2.5, 1.2, 0.55, 0.5})
+    frames.push_back(plane_frame(small_camera(), depth, look_along(-depth * forward, forward)));
+  return frames;
+}
+
+TEST_F(MapperDeviceFaults, TheFirstFrame) {
+  Report wanted;
+  wanted.created = 100;
+  EXPECT_GT(fail_everywhere(undecimated(), orbit_frames(small_camera(), 2, 6), 0, wanted), 20u);
+}
+
+/// With surfels that leave and come, kept views alone.
+TEST_F(MapperDeviceFaults, AFrameThatRemovesAndCreates) {
+  Report wanted;
+  wanted.removed = wanted.created = 100;
+  fail_everywhere(undecimated(), orbit_frames(small_camera(), 4, 6), 2, wanted);
+}
+
+/// As before, and with known space from the surfels, because views have been forgotten.
+TEST_F(MapperDeviceFaults, AFrameThatNeedsKnownSpace) {
+  Config config = undecimated();
+  config.recent_views = 1;
+  Report wanted;
+  wanted.removed = wanted.created = 1;
+  fail_everywhere(config, orbit_frames(small_camera(), 5, 6), 3, wanted);
+}
+
+TEST_F(MapperDeviceFaults, AFrameThatSplits) {
+  Report wanted;
+  wanted.split = wanted.created = 1;
+  fail_everywhere(undecimated(), approach(), 2, wanted);
+}
+
+/// The device fails from some call on, so that the map cannot even be restored. Once the device works again, nothing is lost.
+TEST_F(MapperDeviceFaults, ADeviceThatStaysAway) {
+  const Frames frames = approach();
+  const auto undisturbed = begin(undecimated(), frames, 2), mapper = begin(undecimated(), frames, 2);
+  const Seen before(*undisturbed);
+  expect_same(Seen(*mapper), before);
+  undisturbed->integrate(frames[2].view());
+  const Seen after(*undisturbed);
+  for (std::size_t n = 0; !HasFailure(); ++n) {
+    SCOPED_TRACE("from call " + std::to_string(n) + " on");
+    const std::string said = refusal(*mapper, frames[2], n, kForEver);
+    if (said.empty()) break;
+    const std::string later = fault_of<DeviceError>([&] { mapper->surfels(); });
+    EXPECT_NE(later.find("CL_OUT_OF_RESOURCES"), std::string::npos) << later;
+    EXPECT_EQ(mapper->size(), before.size);
+    FaultInjection::stop();
+    EXPECT_TRUE(same(mapper->surfels(), before.surfels));
+  }
+  FaultInjection::stop();
+  expect_same(Seen(*mapper), after);
+}
+
+/// load() and reset() when a frame could not be undone.
+TEST_F(MapperDeviceFaults, LoadAfterAFrameThatCouldNotBeUndone) {
+  const Frames frames = approach();
+  const auto undisturbed = begin(undecimated(), frames, 2);
+  const std::vector<Surfel> saved = undisturbed->surfels();
+  undisturbed->load(saved);
+  undisturbed->integrate(frames[3].view());
+  for (std::size_t n = 40; !HasFailure(); n += 5) {
+    const auto mapper = begin(undecimated(), frames, 2);
+    if (refusal(*mapper, frames[2], n, kForEver).empty()) break;
+    FaultInjection::stop();
+    mapper->load(saved);
+    EXPECT_EQ(mapper->surfels().size(), saved.size());
+    EXPECT_TRUE(all_sound(mapper->surfels()));
+    mapper->integrate(frames[3].view());
+    EXPECT_EQ(mapper->surfels().size(), undisturbed->surfels().size());
+    mapper->reset();
+    EXPECT_TRUE(mapper->surfels().empty());
+  }
+}
+
+/// A load that fails leaves the map as it was, or says that it is lost.
+TEST_F(MapperDeviceFaults, ALoadThatFails) {
+  const Frames frames = orbit_frames(small_camera(), 3, 6);
+  const auto mapper = begin(undecimated(), frames, 2);
+  const std::vector<Surfel> before = mapper->surfels();
+  const std::vector<Surfel> other = begin(undecimated(), frames, 1)->surfels();
+  int lost = 0;
+  for (std::size_t n = 0;; ++n) {
+    SCOPED_TRACE("call " + std::to_string(n));
+    FaultInjection::fail(n, 1);
+    const std::string said = fault_of<DeviceError>([&] { mapper->load(other); });
+    FaultInjection::stop();
+    if (said.empty()) break;
+    const std::string later = fault_of<DeviceError>([&] { EXPECT_EQ(mapper->surfels().size(), before.size()); });
+    if (later.empty()) continue;
+    ++lost;
+    EXPECT_NE(later.find("lost"), std::string::npos) << later;
+    EXPECT_EQ(fault_of<DeviceError>([&] { mapper->integrate(frames[2].view()); }), later);
+    mapper->load(before);
+    EXPECT_EQ(mapper->surfels().size(), before.size());
+  }
+  EXPECT_GT(lost, 0);
+  EXPECT_EQ(mapper->surfels().size(), other.size());
+}
+
+/// With a map folder, blocks come and go whole, and what the folder has at the end is the map.
+TEST_F(MapperDeviceFaults, WithAMapFolder) {
+  const auto folder = std::filesystem::temp_directory_path() / ("device_faults_" + std::to_string(getpid()));
+  Config config = undecimated();
+  config.eviction_radius = 9;
+  const Eigen::Vector3d forward(0, 1, 0);
+  Frames frames;
+  for (const double along : {0.0, 40.0, 0.0, 40.0, 0.0})
+    frames.push_back(plane_frame(small_camera(), 2, look_along(Eigen::Vector3d(along, 0, 0), forward)));
+  const auto positions = [&](Mapper& mapper) {
+    const auto path = folder.string() + ".ply";
+    mapper.save(path);
+    std::vector<std::array<float, 3>> sorted;
+    for (const Surfel& s : read_map(path)) sorted.push_back({s.position.x(), s.position.y(), s.position.z()});
+    std::filesystem::remove(path);
+    std::sort(sorted.begin(), sorted.end());
+    return sorted;
+  };
+  config.map_folder = folder.string();
+  std::filesystem::remove_all(folder);
+  const auto expected = positions(*begin(config, frames, frames.size()));
+  std::size_t failed = 1;
+  for (std::size_t n = 0; failed > 0 && !HasFailure(); n += 7 + n / 7) {
+    SCOPED_TRACE("from call " + std::to_string(n) + " on");
+    failed = 0;
+    std::filesystem::remove_all(folder);
+    {
+      Mapper mapper(config);
+      for (const auto& frame : frames) {
+        failed += refusal(mapper, frame, n, 2).empty() ? 0 : 1;
+        FaultInjection::stop();
+        while (mapper.sequence() < static_cast<std::size_t>(&frame - &frames[0]) + 1)
+          fault_of<DeviceError>([&] { mapper.integrate(frame.view()); });
+      }
+      EXPECT_TRUE(positions(mapper) == expected);
+    }
+    Mapper again(config);
+    EXPECT_TRUE(positions(again) == expected) << "the folder has another map";
+  }
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace frontier_surfels

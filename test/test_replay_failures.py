@@ -1,0 +1,214 @@
+#!/usr/bin/python3
+"""Tests what replay_score does if a recording, the disk or the user lets it down.
+
+usage: test_replay_failures.py REPLAY_SCORE MAKE_SYNTHETIC
+"""
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy
+import PIL.Image
+
+import test_replay_score
+from test_replay_score import DONE, FAILED, SOURCES, WRONG_USAGE, read_json, read_rows, run
+
+
+def small_disk(size):
+    """For preexec_fn: files of this process can have `size` bytes only."""
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # so that write() fails, as on a full disk
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+    return limit
+
+
+def read_folder(folder):
+    content = {}
+    for name in os.listdir(folder):
+        with open(os.path.join(folder, name), 'rb') as file:
+            content[name] = file.read()
+    return content
+
+
+class CommandLine(unittest.TestCase):
+    def check(self, program, arguments, sentence):
+        result = subprocess.run([program, *arguments], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, WRONG_USAGE, result.stderr)
+        name = os.path.basename(program)
+        self.assertRegex(result.stderr, f'^{name}: {sentence}\nUsage: {name} --help [^\n]*\n$')
+        self.assertEqual(result.stdout, '')
+
+    def test_unknown_options_come_first(self):
+        for arguments, sentence in [(['room', '--reprt', 'x'], r'There is no option --reprt; did you mean --report\?'),
+                                    (['--octomap_resolution=0'], r'There is no option --octomap_resolution; did you mean --octomap-resolution\?'),
+                                    (['--first', '-5', '--xyzzyx'], r'There is no option --xyzzyx\.'),
+                                    (['room'], r'--report is required')]:
+            with self.subTest(arguments=arguments):
+                self.check(test_replay_score.PROGRAM, arguments, sentence)
+
+    def test_other_programs_do_the_same(self):
+        self.check(test_replay_score.MAKE_SYNTHETIC, ['--frame', '3'], r'There is no option --frame; did you mean --frames\?')
+        self.check(test_replay_score.MAKE_SYNTHETIC, [], r'OUT is required')
+        to_bag = os.path.join(os.path.dirname(test_replay_score.PROGRAM), 'sequence_to_bag')
+        if os.path.exists(to_bag):  # a build with ROS
+            self.check(to_bag, ['room', 'x.bag', '--depht-topic', '/x'], r'There is no option --depht-topic; did you mean --depth-topic\?')
+
+
+class EarlierReport(unittest.TestCase):
+    """A report stays as it is until the next one can take its place."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.room = os.path.join(cls.folder.name, 'room')
+        subprocess.run([test_replay_score.MAKE_SYNTHETIC, cls.room, '--frames', '3', '--size', '160x120'], check=True, stdout=subprocess.DEVNULL)
+        cls.report = os.path.join(cls.folder.name, "the user's report")
+        cls.arguments = ['--report', cls.report, '--set', 'decimation=1', '--octomap-resolution', 0, '--no-exact']
+        result = run(cls.room, *cls.arguments)
+        assert result.returncode == DONE, result.stderr
+        with open(os.path.join(cls.report, 'notes.txt'), 'w', encoding='utf-8') as file:
+            file.write('of the user')
+        cls.before = read_folder(cls.report)
+
+    def check_kept(self, result):
+        self.assertEqual(result.returncode, FAILED, result.stderr)
+        self.assertRegex(result.stderr, r'^(Skipped [^\n]*\n|\.\.\. and [^\n]*\n)*replay_score: [^\n]*\n$')
+        self.assertEqual(read_folder(self.report), self.before)
+
+    def test_mistyped_recording(self):
+        self.check_kept(run(self.room + 'x', *self.arguments))
+        self.check_kept(run(self.room, *self.arguments, '--first', 100))
+
+    def test_damaged_recordings(self):
+        bag = os.path.join(self.folder.name, 'damaged.bag')
+        with open(bag, 'wb') as file:
+            file.write(b'#ROSBAG V2.0\n' + 5000 * b'x')
+        self.check_kept(run(bag, *self.arguments))
+        damaged = os.path.join(self.folder.name, 'damaged')
+        shutil.copytree(self.room, damaged)
+        for name in os.listdir(os.path.join(damaged, 'depth')):
+            with open(os.path.join(damaged, 'depth', name), 'wb') as file:
+                file.write(b'no image')
+        self.check_kept(run(damaged, *self.arguments))
+
+    def test_full_disk(self):
+        self.check_kept(run(self.room, *self.arguments, preexec_fn=small_disk(len(self.before['surfels.ply']) // 2)))
+
+    def test_a_failed_run_leaves_no_folder(self):
+        report = os.path.join(self.folder.name, 'another')
+        run(self.room + 'x', '--report', report)
+        self.assertFalse(os.path.exists(report))
+
+    def test_page_on_a_full_disk(self):
+        script = os.path.join(SOURCES, 'scripts', 'replay_report.py')
+        size = len(self.before['report.html']) // 2
+        result = subprocess.run([script, self.report], capture_output=True, text=True, timeout=60, preexec_fn=small_disk(size))
+        self.assertEqual(result.returncode, FAILED)
+        self.assertRegex(result.stderr, r'^replay_report: [^\n]*File too large[^\n]*\n$')
+        self.assertEqual(read_folder(self.report), self.before)
+
+    def test_interrupted_page(self):
+        script = os.path.join(SOURCES, 'scripts', 'replay_report.py')
+        for delay in (0.05, 0.2, 0.5, 1):
+            process = subprocess.Popen([script, self.report], stderr=subprocess.PIPE, text=True,
+                                       preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}))
+            time.sleep(delay)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=60)
+            self.assertEqual(errors, '', delay)
+            self.assertIn(process.returncode, (-signal.SIGINT, DONE))
+            self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
+
+    def test_interrupt_while_the_page_is_made(self):
+        report = os.path.join(self.folder.name, "another user's report")
+        process = subprocess.Popen([test_replay_score.PROGRAM, self.room, '--report', report, *map(str, self.arguments[2:])], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True, start_new_session=True)
+        deadline = time.monotonic() + 60
+        while not os.path.exists(os.path.join(report, 'summary.json')) and time.monotonic() < deadline:
+            time.sleep(0.005)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, FAILED, errors)
+        self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C[^\n]*\n$')
+        self.assertEqual(sorted(os.listdir(report)), ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt'])
+        subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
+        self.assertIn('report.html', os.listdir(report))
+
+
+class NothingUsable(unittest.TestCase):
+    """Recordings whose frames add nothing to a map: each has its reason, and a sentence that says what to do."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.room = os.path.join(self.folder.name, 'room')
+        self.report = os.path.join(self.folder.name, 'report')
+        subprocess.run([test_replay_score.MAKE_SYNTHETIC, self.room, '--frames', '3', '--size', '80x60'], check=True, stdout=subprocess.DEVNULL)
+
+    def change_depth(self, change):
+        for name in os.listdir(os.path.join(self.room, 'depth')):
+            path = os.path.join(self.room, 'depth', name)
+            depth = numpy.array(PIL.Image.open(path)).astype(int)
+            PIL.Image.fromarray(change(depth).astype(numpy.uint16)).save(path)
+
+    def run_room(self):
+        return run(self.room, '--report', self.report, '--set', 'decimation=1', '--octomap-resolution', 0.05)
+
+    def test_depths(self):
+        for reason, remedy, change in [('no_measurement', 'camera delivers depth', lambda depth: 0 * depth),
+                                       ('saturated', 'camera and its driver', lambda depth: 0 * depth + 65535),
+                                       ('too_near', 'correct depth_unit', lambda depth: depth * 0 + 7),
+                                       ('too_far', 'correct depth_unit', lambda depth: depth * 0 + 60000)]:
+            with self.subTest(reason=reason):
+                self.change_depth(change)
+                result = self.run_room()
+                self.assertEqual(result.returncode, FAILED, result.stderr)
+                self.assertRegex(result.stderr, r'^replay_score: The map of [^\n]* is empty. 3 of 3 depth images [^\n]*' + remedy + r'[^\n]*\n$')
+                self.assertRegex(result.stdout, r'WARNING +3 of 3 depth images [^\n]*' + remedy)
+                self.assertNotRegex(result.stdout, 'exact test|OctoMap')
+                self.assertEqual([row['reason'] for row in read_rows(self.report)], 3 * [reason])
+                summary = read_json(self.report)
+                self.assertEqual(summary['reasons'], {reason: 3})
+                self.assertNotIn('exact', summary)
+                with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+                    self.assertIn(remedy, file.read())
+
+    def test_still_camera(self):
+        path = os.path.join(self.room, 'poses.txt')
+        with open(path, encoding='utf-8') as file:
+            lines = file.readlines()
+        pose = lines[1].split(' ', 1)[1]
+        with open(path, 'w', encoding='utf-8') as file:
+            file.writelines(line.split(' ', 1)[0] + ' ' + pose for line in lines[1:])
+        result = self.run_room()
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertRegex(result.stdout, 'WARNING +The camera never moves: all 3 frames have the same pose [^\n]*poses.txt')
+        self.assertEqual([row['reason'] for row in read_rows(self.report)], 3 * ['still_camera'])
+
+    def test_summary_and_page_name_frame_date_and_version(self):
+        result = self.run_room()
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertNotIn('WARNING', result.stdout)
+        summary = read_json(self.report)
+        self.assertEqual((summary['warnings'], summary['reasons'], summary['skipped']), ([], {}, []))
+        self.assertRegex(summary['date'], r'^20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ$')
+        self.assertRegex(summary['version'], r'^\d+\.\d+\.\d+$')
+        self.assertEqual(summary['world_frame'], 'world of poses.txt')
+        with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+            page = file.read()
+        for text in (summary['date'], 'frontier_surfels ' + summary['version'], summary['world_frame']):
+            self.assertIn(text, page)
+
+
+if __name__ == '__main__':
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    test_replay_score.PROGRAM, test_replay_score.MAKE_SYNTHETIC = map(os.path.abspath, sys.argv[1:])
+    unittest.main(argv=sys.argv[:1], verbosity=2)
