@@ -73,12 +73,14 @@ struct Mapper::Impl {
         creation(commands, lists),
         remembering(commands) {
     if (config.map_folder.empty()) return;
-    archive = std::make_unique<MapArchive>(config, map, seen, views);
+    archive = std::make_unique<MapArchive>(config, map, seen, views,
+                                           [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
     views.clear(archive->empty());
     load_views(archive->stored_views());
   }
 
   void begin_call();
+  void remember_forgotten();
   Report integrate(const DepthFrame& input);
   Report update(const DepthFrame& input);
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
@@ -86,6 +88,7 @@ struct Mapper::Impl {
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(std::uint32_t number, Report& report);
   Changes changes(std::uint64_t since);
+  SavedMap saved_map();
   void begin_map(const SavedMap& saved);
   void load_views(const std::vector<SavedView>& saved);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
@@ -131,6 +134,13 @@ Report Mapper::integrate(const DepthFrame& frame) {
 void Mapper::Impl::begin_call() {
   commands.forget_times();
   map.roll_back();
+}
+
+/// What the last frame has forgotten is remembered by the next call that needs it, before anything else. If that fails, the frame that
+/// forgot it is in the map all the same, and the call after that goes on with it.
+void Mapper::Impl::remember_forgotten() {
+  const std::vector<BlockKey> changed = remembering.remember_forgotten(views, map.block_size(), seen);
+  if (archive) archive->note_changed(changed);
 }
 
 /// All or nothing.
@@ -204,6 +214,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   begin_call();
+  remember_forgotten();
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
@@ -211,7 +222,7 @@ Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry
   views.set_current(image, T_world_camera);
   seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : kSeenSpacing * camera.grid().delta_min);
   seen.open_window(map.window());
-  return make_frame(camera, map.window(), views, seen, limits);
+  return make_frame(camera, map.window(), views, config.seen_points ? &seen : nullptr, limits);
 }
 
 /// Finds the candidates, and then visits the surfels, which clears the candidates in their voxels.
@@ -238,10 +249,6 @@ void Mapper::Impl::finish_frame(std::uint32_t number, Report& report) {
   sequence = report.sequence;
   frame_on_device = pages_changed ? 0 : sequence;
   pages_changed = false;
-  if (config.seen_points && views.forgotten()) {
-    const std::vector<BlockKey> changed = remembering.remember(*views.forgotten(), views, map.block_size(), seen);
-    if (archive) archive->note_changed(changed);
-  }
   if (archive) {
     archive->note_changed(shrunk);
     archive->save_some(number);
@@ -292,14 +299,17 @@ std::vector<Surfel> Mapper::whole_map() const {
 }
 
 SavedMap Mapper::saved_map() const {
-  SavedMap map = on_device([&] {
-    impl_->begin_call();
-    SavedMap map = {impl_->map.download(), impl_->seen.saved(), {}};
-    for (const std::uint64_t number : impl_->views.numbers()) map.views.push_back(impl_->views.saved(number));
-    return map;
-  });
+  SavedMap map = on_device([&] { return impl_->saved_map(); });
   if (impl_->archive) impl_->archive->add_stored(map);
   return map;
+}
+
+SavedMap Mapper::Impl::saved_map() {
+  begin_call();
+  remember_forgotten();
+  SavedMap saved = {map.download(), seen.saved(), {}};
+  for (const std::uint64_t number : views.numbers()) saved.views.push_back(views.saved(number));
+  return saved;
 }
 
 void Mapper::save(const std::string& path) const { write_map(path, saved_map()); }
@@ -333,18 +343,18 @@ void Mapper::load(const SavedMap& map) {
 
 void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
-  SeenSpace filled;
-  const bool has_seen = saved.seen.points > 0 && saved.seen.block_size == map.block_size();
-  if (config.seen_points && !has_seen) filled = fill_seen(saved.surfels, map.block_size(), shift_for(saved.surfels, map.block_size()));
-  if (config.seen_points && has_seen) SeenPoints::check(saved.seen);
+  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size()) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
-  ++sequence;
+  map.set_lost(true);  // until all that belongs to it is there
   views.clear(map.size() == 0);
   seen.clear();
-  if (config.seen_points) seen.load(has_seen ? saved.seen : filled);
+  if (config.seen_points) seen.load(has_seen);
   load_views(saved.views);
+  map.set_lost(false);
+  ++sequence;
   if (!archive) return;
   archive->clear();
+  archive->note_changed(seen.blocks_with_points());
   archive->save_some(static_cast<std::uint32_t>(sequence));
 }
 
@@ -353,7 +363,7 @@ void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
   for (const SavedView& view : saved) {
     views.set_current(working_image_of(view), view.T_world_camera);
     views.keep();
-    if (config.seen_points && views.forgotten()) remembering.remember(*views.forgotten(), views, map.block_size(), seen);
+    remember_forgotten();
     commands.forget_times();
   }
 }

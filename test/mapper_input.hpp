@@ -132,6 +132,22 @@ inline testing::AssertionResult same(const std::vector<Surfel>& a, const std::ve
   return testing::AssertionSuccess();
 }
 
+/// Is the same remembered, point by point, and are the same views kept?
+inline testing::AssertionResult same_memory(const SavedMap& a, const SavedMap& b) {
+  if (a.seen.blocks.size() != b.seen.blocks.size())
+    return testing::AssertionFailure() << "seen points in " << a.seen.blocks.size() << " blocks against " << b.seen.blocks.size();
+  if (!a.seen.blocks.empty() && a.seen.points != b.seen.points)
+    return testing::AssertionFailure() << a.seen.points << " points against " << b.seen.points;
+  for (std::size_t n = 0; n < a.seen.blocks.size(); ++n)
+    if (a.seen.blocks[n].block != b.seen.blocks[n].block || a.seen.blocks[n].bytes != b.seen.blocks[n].bytes)
+      return testing::AssertionFailure() << "seen points of block " << n << " of " << a.seen.blocks.size() << " differ";
+  if (a.views.size() != b.views.size()) return testing::AssertionFailure() << a.views.size() << " views against " << b.views.size();
+  for (std::size_t n = 0; n < a.views.size(); ++n)
+    if (a.views[n].T_world_camera.matrix() != b.views[n].T_world_camera.matrix() || a.views[n].depth != b.views[n].depth)
+      return testing::AssertionFailure() << "view " << n << " of " << a.views.size() << " differs";
+  return testing::AssertionSuccess();
+}
+
 /// Are all surfels valid (finite, with a unit normal and a positive radius), and do their ids ascend?
 inline testing::AssertionResult all_sound(const std::vector<Surfel>& surfels) {
   for (const Surfel& s : surfels)

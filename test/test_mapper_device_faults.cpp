@@ -2,12 +2,12 @@
 /// the map that it would have given without the failure.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
 
-#include "frontier_surfels/map_file.hpp"
 #include "mapper_input.hpp"
 #include "opencl/fault_injection.hpp"
 
@@ -75,10 +75,12 @@ class MapperDeviceFaults : public testing::Test {
     EXPECT_GE(report.removed, wanted.removed);
     EXPECT_GE(report.created, wanted.created);
     const Seen before(*undisturbed);
+    const SavedMap memory_before = undisturbed->saved_map();
     undisturbed->integrate(frames[at].view());
     const Seen after(*undisturbed);
     undisturbed->integrate(frames[at + 1].view());
     const Seen later(*undisturbed);
+    const SavedMap memory_later = undisturbed->saved_map();
     for (std::size_t n = 0; n < calls && !testing::Test::HasFailure(); ++n) {
       SCOPED_TRACE("call " + std::to_string(n) + " of " + std::to_string(calls));
       const auto mapper = begin(config, frames, at);
@@ -87,10 +89,14 @@ class MapperDeviceFaults : public testing::Test {
       EXPECT_NE(said.find("CL_"), std::string::npos) << said;
       EXPECT_EQ(said.back(), '.') << said;
       expect_same(Seen(*mapper), before);
+      if (n % 2 == 0) {  // it ends what a frame would have to
+        EXPECT_TRUE(same_memory(mapper->saved_map(), memory_before));
+      }
       mapper->integrate(frames[at].view());
       expect_same(Seen(*mapper), after);
       mapper->integrate(frames[at + 1].view());
       expect_same(Seen(*mapper), later);
+      EXPECT_TRUE(same_memory(mapper->saved_map(), memory_later));
     }
     return calls;
   }
@@ -121,7 +127,27 @@ TEST_F(MapperDeviceFaults, AFrameThatRemovesAndCreates) {
 /// As before, and with known space from the surfels, because views have been forgotten.
 TEST_F(MapperDeviceFaults, AFrameThatNeedsKnownSpace) {
   Config config = undecimated();
+  config.seen_points = false;
   config.recent_views = 1;
+  Report wanted;
+  wanted.removed = wanted.created = 1;
+  fail_everywhere(config, orbit_frames(small_camera(), 5, 6), 3, wanted);
+}
+
+/// Views leave the ring, and become seen points: the first one before the frame that fails, so that the memory is empty until then, or one
+/// of several.
+TEST_F(MapperDeviceFaults, AFrameAfterOneThatForgetsAView) {
+  Config config = undecimated();
+  config.recent_views = 3;
+  Report wanted;
+  wanted.removed = wanted.created = 1;
+  for (const std::size_t at : {4u, 6u}) fail_everywhere(config, orbit_frames(small_camera(), 8, 6), at, wanted);
+}
+
+/// No view is kept, not even the last one.
+TEST_F(MapperDeviceFaults, AFrameAfterOneThatIsNotKept) {
+  Config config = undecimated();
+  config.recent_views = 0;
   Report wanted;
   wanted.removed = wanted.created = 1;
   fail_everywhere(config, orbit_frames(small_camera(), 5, 6), 3, wanted);
@@ -176,72 +202,96 @@ TEST_F(MapperDeviceFaults, LoadAfterAFrameThatCouldNotBeUndone) {
   }
 }
 
-/// A load that fails leaves the map as it was, or says that it is lost.
+/// A load that fails leaves the map as it was, or says that it is lost. Maps with seen points and kept views, or surfels alone.
 TEST_F(MapperDeviceFaults, ALoadThatFails) {
-  const Frames frames = orbit_frames(small_camera(), 3, 6);
-  const auto mapper = begin(undecimated(), frames, 2);
-  const std::vector<Surfel> before = mapper->surfels();
-  const std::vector<Surfel> other = begin(undecimated(), frames, 1)->surfels();
-  int lost = 0;
-  for (std::size_t n = 0;; ++n) {
-    SCOPED_TRACE("call " + std::to_string(n));
-    FaultInjection::fail(n, 1);
-    const std::string said = fault_of<DeviceError>([&] { mapper->load(other); });
-    FaultInjection::stop();
-    if (said.empty()) break;
-    const std::string later = fault_of<DeviceError>([&] { EXPECT_EQ(mapper->surfels().size(), before.size()); });
-    if (later.empty()) continue;
-    ++lost;
-    EXPECT_NE(later.find("lost"), std::string::npos) << later;
-    EXPECT_EQ(fault_of<DeviceError>([&] { mapper->integrate(frames[2].view()); }), later);
+  const Frames frames = orbit_frames(small_camera(), 6, 6);
+  Config config = undecimated();
+  config.recent_views = 2;
+  const auto mapper = begin(config, frames, 5);
+  const SavedMap before = mapper->saved_map(), other = begin(config, frames, 4)->saved_map();
+  for (const SavedMap& loaded : {other, SavedMap{other.surfels, {}, {}}}) {
+    int lost = 0;
+    for (std::size_t n = 0;; ++n) {
+      SCOPED_TRACE("call " + std::to_string(n));
+      FaultInjection::fail(n, 1);
+      const std::string said = fault_of<DeviceError>([&] { mapper->load(loaded); });
+      FaultInjection::stop();
+      if (said.empty()) break;
+      const std::string later =
+          fault_of<DeviceError>([&] { EXPECT_TRUE(same_memory(mapper->saved_map(), before) && mapper->size() == before.surfels.size()); });
+      if (later.empty()) continue;
+      ++lost;
+      EXPECT_NE(later.find("lost"), std::string::npos) << later;
+      EXPECT_EQ(fault_of<DeviceError>([&] { mapper->integrate(frames[5].view()); }), later);
+      mapper->load(before);
+      EXPECT_TRUE(same_memory(mapper->saved_map(), before));
+    }
+    EXPECT_GT(lost, 0);
+    EXPECT_EQ(mapper->surfels().size(), other.surfels.size());
+    if (!loaded.views.empty()) {
+      EXPECT_TRUE(same_memory(mapper->saved_map(), other));
+    }
     mapper->load(before);
-    EXPECT_EQ(mapper->surfels().size(), before.size());
   }
-  EXPECT_GT(lost, 0);
-  EXPECT_EQ(mapper->surfels().size(), other.size());
+}
+
+/// The surfels' positions, sorted, and what has been seen.
+struct Content {
+  explicit Content(const Mapper& mapper) : memory(mapper.saved_map()) {
+    for (const Surfel& s : memory.surfels) positions.push_back({s.position.x(), s.position.y(), s.position.z()});
+    std::sort(positions.begin(), positions.end());
+  }
+
+  SavedMap memory;
+  std::vector<std::array<float, 3>> positions;
+};
+
+testing::AssertionResult same(const Content& a, const Content& b) {
+  if (a.positions != b.positions) return testing::AssertionFailure() << "other surfels";
+  return same_memory(a.memory, b.memory);
 }
 
 /// With a map folder, blocks come and go whole, and what the folder has at the end is the map.
-TEST_F(MapperDeviceFaults, WithAMapFolder) {
+/// @param recent_views  with 1, a view is forgotten when the blocks that it has seen are on disk
+void expect_whole_map_folder(int recent_views) {
   const auto folder = std::filesystem::temp_directory_path() / ("device_faults_" + std::to_string(getpid()));
   Config config = undecimated();
-  config.eviction_radius = 9;
+  config.recent_views = recent_views;
   const Eigen::Vector3d forward(0, 1, 0);
   Frames frames;
-  for (const double along : {0.0, 40.0, 0.0, 40.0, 0.0})
+  for (const double along : {0.0, 40.0, 0.0, 40.0, 0.1})
     frames.push_back(plane_frame(small_camera(), 2, look_along(Eigen::Vector3d(along, 0, 0), forward)));
-  const auto positions = [&](Mapper& mapper) {
-    const auto path = folder.string() + ".ply";
-    mapper.save(path);
-    std::vector<std::array<float, 3>> sorted;
-    for (const Surfel& s : read_map(path)) sorted.push_back({s.position.x(), s.position.y(), s.position.z()});
-    std::filesystem::remove(path);
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
-  };
+  Mapper plain(config);
+  integrate_all(plain, frames);
+  const Content expected(plain);
+  EXPECT_FALSE(expected.memory.seen.blocks.empty());
+  config.eviction_radius = 9;
   config.map_folder = folder.string();
-  std::filesystem::remove_all(folder);
-  const auto expected = positions(*begin(config, frames, frames.size()));
   std::size_t failed = 1;
-  for (std::size_t n = 0; failed > 0 && !HasFailure(); n += 7 + n / 7) {
+  for (std::size_t n = 0; failed > 0 && !testing::Test::HasFailure(); n += 7 + n / 7) {
     SCOPED_TRACE("from call " + std::to_string(n) + " on");
     failed = 0;
     std::filesystem::remove_all(folder);
     {
       Mapper mapper(config);
       for (const auto& frame : frames) {
-        failed += refusal(mapper, frame, n, 2).empty() ? 0 : 1;
+        FaultInjection::fail(n, 2);
+        failed += fault_of<DeviceError>([&] { mapper.integrate(frame.view()); }).empty() ? 0 : 1;
         FaultInjection::stop();
         while (mapper.sequence() < static_cast<std::size_t>(&frame - &frames[0]) + 1)
           fault_of<DeviceError>([&] { mapper.integrate(frame.view()); });
       }
-      EXPECT_TRUE(positions(mapper) == expected);
+      EXPECT_TRUE(same(Content(mapper), expected));
     }
     Mapper again(config);
-    EXPECT_TRUE(positions(again) == expected) << "the folder has another map";
+    EXPECT_TRUE(same(Content(again), expected)) << "the folder has another map";
   }
   std::filesystem::remove_all(folder);
 }
+
+TEST_F(MapperDeviceFaults, WithAMapFolder) { expect_whole_map_folder(700); }
+
+TEST_F(MapperDeviceFaults, WithAMapFolderAndFewViews) { expect_whole_map_folder(1); }
 
 }  // namespace
 }  // namespace frontier_surfels

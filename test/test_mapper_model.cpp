@@ -52,7 +52,8 @@ rc::Gen<Step> any_step() {
                                                                                             {6, Action::kChanges},
                                                                                             {1, Action::kFailingChanges},
                                                                                             {1, Action::kBox}})),
-                              rc::gen::set(&Step::which, below(12)), rc::gen::set(&Step::call, rc::gen::oneOf(below(12), below(75))),
+                              rc::gen::set(&Step::which, below(12)),
+                              rc::gen::set(&Step::call, rc::gen::oneOf(below(12), below(75), below(200))),
                               rc::gen::set(&Step::for_good, rc::gen::arbitrary<bool>()));
 }
 
@@ -122,7 +123,9 @@ class MapperModel : public testing::Test {
     std::filesystem::create_directories(folder_);
     config_ = config;
     mapper_ = std::make_unique<Mapper>(config);
-    undisturbed_ = std::make_unique<Mapper>(undecimated());
+    Config in_memory = config;
+    in_memory.map_folder.clear();
+    undisturbed_ = std::make_unique<Mapper>(in_memory);
   }
 
   void take(const Step& step) {
@@ -157,6 +160,7 @@ class MapperModel : public testing::Test {
     mapper_.reset();
     mapper_ = std::make_unique<Mapper>(config_);
     check(same(without_ids(mapper_->whole_map()), without_ids(undisturbed_->surfels())), "the map that the folder has at the end");
+    check(same_memory(mapper_->saved_map(), undisturbed_->saved_map()), "what the folder remembers at the end");
   }
 
  private:
@@ -211,7 +215,9 @@ class MapperModel : public testing::Test {
   void save() {
     saved_ = without_ids(undisturbed_->surfels());
     mapper_->save(path_);
-    check(same(without_ids(read_map(path_)), saved_), "the saved map");
+    const SavedMap map = read_saved_map(path_);
+    check(same(without_ids(map.surfels), saved_), "the saved map");
+    check(same_memory(map, undisturbed_->saved_map()), "what the saved map remembers");
     is_saved_ = true;
   }
 
@@ -227,7 +233,7 @@ class MapperModel : public testing::Test {
   void failing_load(const Step& step) {
     if (!is_saved_) return;
     save_may_have_failed_ = evicts();
-    if (!fails(step.call % 12, step, [&] { mapper_->load(path_); })) {
+    if (!fails(step.call % 60, step, [&] { mapper_->load(path_); })) {
       undisturbed_->load(path_);
     } else if (const std::string said = fault_of<DeviceError>([&] { mapper_->surfels(); }); !said.empty()) {
       RC_ASSERT(said.find("lost") != std::string::npos);
@@ -279,15 +285,38 @@ class MapperModel : public testing::Test {
   bool save_may_have_failed_ = false;  ///< in the map folder; then the next frame is refused
 };
 
+/// Views are forgotten soon, so that seen points decide.
+Config few_views() {
+  Config config = undecimated();
+  config.recent_views = 2;
+  return config;
+}
+
 RC_GTEST_FIXTURE_PROP(MapperModel, InMemory, ()) {
   const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
   begin(undecimated());
   for (const Step& step : steps) take(step);
 }
 
+RC_GTEST_FIXTURE_PROP(MapperModel, InMemoryWithFewViews, ()) {
+  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
+  begin(few_views());
+  for (const Step& step : steps) take(step);
+}
+
 RC_GTEST_FIXTURE_PROP(MapperModel, WithAMapFolder, ()) {
   const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
   Config config = undecimated();
+  config.eviction_radius = 9;
+  config.map_folder = (folder_ / "map").string();
+  begin(config);
+  for (const Step& step : steps) take(step);
+  reopen();
+}
+
+RC_GTEST_FIXTURE_PROP(MapperModel, WithAMapFolderAndFewViews, ()) {
+  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
+  Config config = few_views();
   config.eviction_radius = 9;
   config.map_folder = (folder_ / "map").string();
   begin(config);

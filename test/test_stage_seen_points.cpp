@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "map/seen_block.hpp"
 #include "stages/frame_fixture.hpp"
 #include "stages/reference_views.hpp"
 #include "stages/remembering.hpp"
@@ -142,6 +143,47 @@ TEST_F(SeenPointsTest, BlocksComeAndGo) {
   EXPECT_EQ(seen.saved().blocks.size(), saved.blocks.size() / 2);
   seen.add_blocks(gone);
   expect_right_points();
+}
+
+/// Also when all blocks have gone to the archive, or come from a file without a seen point.
+TEST_F(SeenPointsTest, TheLatticeStaysOnceSomethingIsRemembered) {
+  remember(cameras().front(), 1, 0.02, Content::mixed, true);
+  SeenPoints& seen = fixture_->seen();
+  const int shift = seen.shift();
+  for (const BlockKey& block : seen.blocks()) seen.drop_block(block);
+  const SeenSpace nothing = seen.saved();
+  seen.choose_spacing(0.001);
+  EXPECT_EQ(seen.shift(), shift);
+  seen.load(nothing);
+  EXPECT_EQ(seen.shift(), shift);
+  seen.choose_spacing(0.001);
+  EXPECT_GT(seen.shift(), shift) << "a file without a seen point decides nothing";
+}
+
+TEST_F(SeenPointsTest, UnitedBlocksHaveThePointsOfBoth) {
+  SeenBlockBytes a, b;
+  a.add_points([](int n) { return n % 2 == 0; });
+  b.add_points([](int n) { return n % 3 == 0; });
+  a.add_points([](int n) { return n % 2 == 0; });
+  b.add_points([](int n) { return n % 2 == 1; });
+  a.add_uniform(SEEN_NONE);
+  b.add_points([](int n) { return n == 5; });
+  a.add_uniform(SEEN_ALL);
+  b.add_points([](int n) { return n == 5; });
+  a.add_uniform(SEEN_NONE);
+  b.add_uniform(SEEN_NONE);
+  SeenBlockBytes expected;
+  expected.add_points([](int n) { return n % 2 == 0 || n % 3 == 0; });
+  expected.add_uniform(SEEN_ALL);
+  expected.add_points([](int n) { return n == 5; });
+  expected.add_uniform(SEEN_ALL);
+  expected.add_uniform(SEEN_NONE);
+  const auto of_a = a.take(), of_b = b.take(), of_both = expected.take();
+  EXPECT_EQ(united_seen_blocks(of_a, of_b, 5), of_both);
+  EXPECT_EQ(united_seen_blocks(of_b, of_a, 5), of_both);
+  EXPECT_EQ(united_seen_blocks(of_a, {}, 5), of_a);
+  EXPECT_EQ(united_seen_blocks({}, of_b, 5), of_b);
+  EXPECT_THROW(united_seen_blocks(of_a, of_b, 4), FileError);
 }
 
 TEST_F(SeenPointsTest, PointsInABoxAreForgotten) {

@@ -1,4 +1,18 @@
-// Work on whole bricks of the seen points (common/seen_points.cl): on their way to and from the host, and forgetting.
+// Work on whole bricks of the seen points (common/seen_points.cl): new ones, those on their way to and from the host, and forgetting.
+
+// One work item handles a place in the tables.
+//   in  entries[count]: place in the tables, number of the brick
+__kernel void set_seen_entries(__global const int2* entries, const int count, __global int* tables) {
+  const int n = get_global_id(0);
+  if (n < count) tables[entries[n].x] = entries[n].y;
+}
+
+// One work item handles a word of a brick: its points are not seen.
+//   in  numbers[count]: of bricks
+__kernel void empty_bricks(__global const int* numbers, const int count, __global ulong* bricks) {
+  const int n = get_global_id(0) / SEEN_WORDS, word = get_global_id(0) % SEEN_WORDS;
+  if (n < count) bricks[SEEN_WORDS * numbers[n] + word] = 0;
+}
 
 // One work item copies a word of a brick.
 //   in  numbers[count]: of bricks;   out gathered[count][SEEN_WORDS]

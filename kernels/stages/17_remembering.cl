@@ -65,16 +65,6 @@ __kernel void find_seen_bricks(const Window window, const View view, const int s
   found[get_global_id(0)] = adds;
 }
 
-// One work item handles a word of a brick that is given to a place of the tables: its points are not seen yet.
-//   in  entries[count]: place in the tables, number of the brick
-__kernel void set_seen_bricks(__global const int2* entries, const int count, __global int* tables, __global ulong* bricks) {
-  const int n = get_global_id(0) / SEEN_WORDS, word = get_global_id(0) % SEEN_WORDS;
-  if (n >= count) return;
-  const int2 entry = entries[n];
-  if (word == 0) tables[entry.x] = entry.y;
-  if (entry.y > SEEN_BRICK_FULL) bricks[SEEN_WORDS * entry.y + word] = 0;
-}
-
 // Words along an edge of the cubes that one work item of see_points handles, and such cubes in a brick: a cube that the view knows nothing
 // of is done with at once.
 #define SEE_EDGE (LANES == 1 ? 1 : 2)

@@ -242,7 +242,8 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
     if (tile_layers(own.layers, tile) == 0) continue;
     if (item == 0) {
       list_entries(&own, tile);
-      list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
+      own.view_count = own.likely_views = 0;
+      if (view_count > 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&f.grid, tile, layer_depth, views, depths, &own);

@@ -52,7 +52,7 @@ ordered_json measure_long(const Options& options, const std::vector<Input>& inpu
   for (const Input& input : inputs) {
     const Config config = input.config(kUsualWidth);
     const std::vector<replay::RecordedFrame> frames = read_all(input);
-    scoring::ExactTest exact(config.z_min, config.z_max, config.decimation);
+    scoring::ExactTest exact(config);
     for (const auto& frame : frames) exact.add(frame.view());
     Mapper mapper(config);
     const std::size_t length = options.quick ? 20 : static_cast<std::size_t>(options.long_frames),

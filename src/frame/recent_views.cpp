@@ -187,7 +187,7 @@ bool RecentViews::differs_enough() const {
 }
 
 void RecentViews::forget(const Kept& view) {
-  if (view.deepest > 0) forgotten_ = ForgottenView{view.intrinsics, view.T_world_camera, view.room, view.deepest};
+  if (config_.seen_points && view.deepest > 0) forgotten_ = ForgottenView{view.intrinsics, view.T_world_camera, view.room, view.deepest};
 }
 
 bool RecentViews::keep_current() {

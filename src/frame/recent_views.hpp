@@ -53,8 +53,10 @@ class RecentViews {
   SavedView saved(std::uint64_t number) const;  ///< a kept view
 
   /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on
-  /// the device until the next set_current(). None if it has no depth, or if a kept view was not replaced.
+  /// the device until the next set_current(). None if it has no depth, if a kept view was not replaced, after dismiss_forgotten(), or
+  /// without config.seen_points.
   const std::optional<ForgottenView>& forgotten() const { return forgotten_; }
+  void dismiss_forgotten() { forgotten_.reset(); }                                         ///< it is remembered elsewhere
   View view_of(const ForgottenView& view, const Eigen::Isometry3d& T_camera_local) const;  ///< as seen from the frame `local`
 
   /// Are all views that were kept since the map was empty still kept? Then the kept views alone know all known space.

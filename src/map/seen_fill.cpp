@@ -8,6 +8,7 @@
 
 #include "common/shared.h"
 #include "map/block_key.hpp"
+#include "map/seen_block.hpp"
 #include "map/seen_points.hpp"
 
 namespace frontier_surfels {
@@ -244,6 +245,13 @@ int shift_for(const std::vector<Surfel>& surfels, double block_size) {
   std::nth_element(radii.begin(), small, radii.end());
   const double voxel = *small * 2 / std::sqrt(3.0);
   return SeenPoints::shift_for_spacing(block_size, kSeenSpacing * voxel);
+}
+
+SeenSpace seen_of(const SavedMap& map, double block_size) {
+  if (map.seen.points == 0 || map.seen.block_size != block_size)
+    return fill_seen(map.surfels, block_size, shift_for(map.surfels, block_size));
+  SeenPoints::check(map.seen);
+  return map.seen;
 }
 
 }  // namespace frontier_surfels

@@ -16,4 +16,8 @@ SeenSpace fill_seen(const std::vector<Surfel>& surfels, double block_size, int s
 /// A shift for fill_seen(): its points are as far apart as those of a mapper that makes surfels of these sizes.
 int shift_for(const std::vector<Surfel>& surfels, double block_size);
 
+/// What has been seen of a saved map; filled in where the map does not have it, or with blocks of another size.
+/// @throws FileError  it is damaged
+SeenSpace seen_of(const SavedMap& map, double block_size);
+
 }  // namespace frontier_surfels

@@ -6,44 +6,13 @@
 #include <utility>
 
 #include "frontier_surfels/types.hpp"
+#include "map/seen_block.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr int kMostShift = 6;  // 64 bricks, hence 1024 points, along a block's edge
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kBrickBytes = SEEN_WORDS * sizeof(cl_ulong);
-
-}  // namespace
-
-void SeenBlockBytes::add_points(const std::function<bool(int)>& is_seen) {
-  states_.push_back(SEEN_MIXED);
-  std::vector<std::uint8_t> words(kBrickBytes, 0);
-  for (int point = 0; point < SEEN_BRICK * SEEN_BRICK * SEEN_BRICK; ++point) {
-    if (!is_seen(point)) continue;
-    const int x = point % SEEN_BRICK, y = point / SEEN_BRICK % SEEN_BRICK, z = point / SEEN_BRICK / SEEN_BRICK;
-    const int word = (z / 4 * 4 + y / 4) * 4 + x / 4, bit = (z % 4 * 4 + y % 4) * 4 + x % 4;
-    words[8 * word + bit / 8] |= static_cast<std::uint8_t>(1 << bit % 8);
-  }
-  words_.insert(words_.end(), words.begin(), words.end());
-}
-
-std::vector<std::uint8_t> SeenBlockBytes::take() {
-  states_.insert(states_.end(), words_.begin(), words_.end());
-  return std::move(states_);
-}
-
-namespace {
-
-void check_block(const std::vector<std::uint8_t>& bytes, std::size_t bricks) {
-  if (bytes.empty()) return;
-  const auto states_end = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bricks, bytes.size()));
-  const auto mixed = static_cast<std::size_t>(std::count(bytes.begin(), states_end, SEEN_MIXED));
-  const bool known = std::all_of(bytes.begin(), states_end, [](std::uint8_t state) { return state <= SEEN_ALL; });
-  if (!known || bytes.size() != bricks + mixed * kBrickBytes)
-    throw FileError("What has been seen in a block is damaged, or was saved with another distance of its points: use another copy.");
-}
-
 }  // namespace
 
 void SeenPoints::check(const SeenSpace& seen) {
@@ -52,18 +21,19 @@ void SeenPoints::check(const SeenSpace& seen) {
   if (seen.points != SEEN_BRICK << shift)
     throw FileError("What has been seen has " + std::to_string(seen.points) +
                     " points along a block's edge, which is no power of two from 16 to 1024: use another copy of the map.");
-  for (const SeenSpace::Block& block : seen.blocks) check_block(block.bytes, std::size_t{1} << (3 * shift));
+  for (const SeenSpace::Block& block : seen.blocks) check_seen_block(block.bytes, std::size_t{1} << (3 * shift));
 }
 
 void SeenPoints::load(const SeenSpace& seen) {
   check(seen);
   choose_shift(static_cast<int>(std::lround(std::log2(seen.points / SEEN_BRICK))));
+  fixed_ = false;  // if nothing was seen, the next frame may choose another one
   std::vector<SeenBlock> blocks;
   for (const SeenSpace::Block& block : seen.blocks) blocks.push_back({{block.block[0], block.block[1], block.block[2]}, block.bytes});
   add_blocks(blocks);
 }
 
-SeenSpace SeenPoints::saved() const {
+SeenSpace SeenPoints::saved() {
   SeenSpace seen;
   seen.block_size = block_size_;
   seen.points = SEEN_BRICK << shift_;
@@ -78,13 +48,17 @@ SeenPoints::SeenPoints(Commands& commands, double block_size)
       block_size_(block_size),
       slots_(commands),
       entries_(commands),
+      new_bricks_list_(commands),
       tables_on_device_(commands),
       bricks_(commands),
       gathered_(commands),
       gathered_list_(commands) {
   clear();
+  send_entries("changes");
+  slots_.send({0});
 }
 
+/// The device gets it with the next send_entries().
 void SeenPoints::clear() {
   fixed_ = false;
   table_of_.clear();
@@ -94,17 +68,13 @@ void SeenPoints::clear() {
   free_.clear();
   used_ = 2;
   changed_places_.clear();
-  tables_on_device_.write(tables_);
-  sent_tables_ = tables_.size();
-  std::vector<cl_ulong> uniform(2 * SEEN_WORDS, 0);
-  std::fill(uniform.begin() + SEEN_WORDS, uniform.end(), ~cl_ulong{0});
-  bricks_.write(uniform);
-  slots_.send({0});
+  new_bricks_.clear();
+  sent_tables_ = 0;
 }
 
 void SeenPoints::choose_spacing(double spacing) {
   const int shift = shift_for_spacing(block_size_, spacing);
-  if (fixed_ || !empty() || shift == shift_) return;
+  if (fixed_ || shift == shift_) return;
   shift_ = shift;
   clear();
 }
@@ -123,6 +93,7 @@ int SeenPoints::shift_for_spacing(double block_size, double spacing) {
 double SeenPoints::spacing() const { return block_size_ / (SEEN_BRICK << shift_); }
 
 void SeenPoints::open_window(const MapWindow& window) {
+  send_entries("remembering");
   std::vector<cl_int> slots(window.cells(), 0);
   for (int cell = 0; cell < window.cells(); ++cell) {
     const auto found = table_of_.find(window.block(cell));
@@ -143,6 +114,7 @@ int SeenPoints::table(const BlockKey& block) {
     free_tables_.pop_back();
   }
   table_of_.emplace(block, number);
+  fixed_ = true;  // also when all blocks have moved to the archive
   return number;
 }
 
@@ -153,14 +125,23 @@ void SeenPoints::set_entry(int table, int brick, cl_int value) {
   changed_places_.push_back(static_cast<cl_int>(place));
 }
 
-cl_int SeenPoints::add_brick(int table, int brick) {
-  cl_int number = static_cast<cl_int>(used_);
-  if (free_.empty()) {
-    ++used_;
-  } else {
-    number = free_.back();
-    free_.pop_back();
+/// Numbers of bricks that nothing else uses.
+std::vector<cl_int> SeenPoints::take_bricks(std::size_t count) {
+  std::vector<cl_int> numbers;
+  for (std::size_t n = 0; n < count; ++n) {
+    if (free_.empty()) {
+      numbers.push_back(static_cast<cl_int>(used_++));
+    } else {
+      numbers.push_back(free_.back());
+      free_.pop_back();
+    }
   }
+  return numbers;
+}
+
+cl_int SeenPoints::add_brick(int table, int brick) {
+  const cl_int number = take_bricks(1).front();
+  new_bricks_.push_back(number);
   set_entry(table, brick, number);
   return number;
 }
@@ -172,23 +153,34 @@ void SeenPoints::set_uniform(int table, int brick, bool seen) {
   set_entry(table, brick, after);
 }
 
+/// What could not be sent waits for the next call.
 void SeenPoints::send_entries(const char* stage) {
+  if (sent_tables_ == 0) {
+    std::vector<cl_ulong> uniform(2 * SEEN_WORDS, 0);
+    std::fill(uniform.begin() + SEEN_WORDS, uniform.end(), ~cl_ulong{0});
+    bricks_.write(uniform);
+  }
   if (tables_.size() > sent_tables_) {
     tables_on_device_.grow(tables_.size(), sent_tables_);
     tables_on_device_.write(std::vector<cl_int>(tables_.begin() + sent_tables_, tables_.end()), sent_tables_);
     sent_tables_ = tables_.size();
   }
+  if (!new_bricks_.empty()) {
+    bricks_.grow(SEEN_WORDS * used_, bricks_.size());
+    new_bricks_list_.send(new_bricks_);
+    commands_.run(stage, "empty_bricks", SEEN_WORDS * new_bricks_.size(), kGroup, new_bricks_list_(),
+                  static_cast<cl_int>(new_bricks_.size()), bricks_());
+    new_bricks_.clear();
+  }
   if (changed_places_.empty()) return;
-  bricks_.grow(SEEN_WORDS * used_, bricks_.size());
   std::sort(changed_places_.begin(), changed_places_.end());
   changed_places_.erase(std::unique(changed_places_.begin(), changed_places_.end()), changed_places_.end());
   std::vector<cl_int2> entries;
   for (const cl_int place : changed_places_) entries.push_back({{place, tables_[place]}});
   const auto count = static_cast<cl_int>(entries.size());
   entries_.send(std::move(entries));
+  commands_.run(stage, "set_seen_entries", count, kGroup, entries_(), count, tables_on_device_());
   changed_places_.clear();
-  commands_.run(stage, "set_seen_bricks", SEEN_WORDS * static_cast<std::size_t>(count), kGroup, entries_(), count, tables_on_device_(),
-                bricks_());
 }
 
 /// Points along an axis between two coordinates [m], counted from the world's origin: first, and one past the last.
@@ -196,47 +188,75 @@ static Eigen::Array2i points_between(double low, double high, double spacing) {
   return {static_cast<int>(std::ceil(low / spacing - 0.5)), static_cast<int>(std::floor(high / spacing - 0.5)) + 1};
 }
 
-void SeenPoints::forget(const Eigen::AlignedBox3d& box) {
-  const int points = SEEN_BRICK << shift_;
+/// The bricks that a box has a part of. Those without a brick of their own get no number. @param whole  gets those that lie in it as a
+/// whole
+std::vector<SeenPoints::PartlyForgotten> SeenPoints::bricks_in(const Eigen::AlignedBox3d& box,
+                                                               std::vector<std::pair<int, int>>& whole) const {
+  const int points = SEEN_BRICK << shift_, sides = (1 << shift_) - 1;
   Eigen::Array<int, 3, 2> range;  // of points
   for (int axis = 0; axis < 3; ++axis) range.row(axis) = points_between(box.min()[axis], box.max()[axis], spacing()).transpose();
-  std::vector<std::pair<BlockKey, int>> tables(table_of_.begin(), table_of_.end());
-  std::sort(tables.begin(), tables.end());
   std::vector<PartlyForgotten> partly;
-  for (const auto& [key, table] : tables)
+  for (const BlockKey& key : blocks())
     for (int brick = 0; brick < bricks_of_block(); ++brick) {
-      const int sides = (1 << shift_) - 1;
       const Eigen::Array3i low = Eigen::Array3i(key.x, key.y, key.z) * points +
                                  Eigen::Array3i(brick & sides, brick >> shift_ & sides, brick >> 2 * shift_) * SEEN_BRICK;
       const Eigen::Array3i first = (range.col(0) - low).max(0), last = (range.col(1) - low).min(SEEN_BRICK);
-      const cl_int before = entry(table, brick);
-      if ((first >= last).any() || before == SEEN_BRICK_EMPTY) continue;
-      if ((first == 0).all() && (last == SEEN_BRICK).all()) {
-        set_uniform(table, brick, false);
-        continue;
-      }
-      const bool was_full = before == SEEN_BRICK_FULL;
-      partly.push_back({table, brick, was_full ? add_brick(table, brick) : before, was_full, first, last});
+      const int table = table_of_.at(key);
+      const cl_int own = entry(table, brick);
+      if ((first >= last).any() || own == SEEN_BRICK_EMPTY) continue;
+      if ((first == 0).all() && (last == SEEN_BRICK).all())
+        whole.emplace_back(table, brick);
+      else
+        partly.push_back({table, brick, own, own == SEEN_BRICK_FULL, first, last});
     }
-  send_entries("forgetting");
-  forget_points(partly);
+  return partly;
 }
 
-void SeenPoints::forget_points(const std::vector<PartlyForgotten>& partly) {
-  if (partly.empty()) return;
+void SeenPoints::forget(const Eigen::AlignedBox3d& box) {
+  send_entries("forgetting");
+  std::vector<std::pair<int, int>> whole;
+  std::vector<PartlyForgotten> partly = bricks_in(box, whole);
+  const auto full = std::count_if(partly.begin(), partly.end(), [](const PartlyForgotten& p) { return p.was_full; });
+  const std::vector<cl_int> numbers = take_bricks(static_cast<std::size_t>(full));
+  auto next = numbers.begin();
+  for (PartlyForgotten& p : partly)
+    if (p.was_full) p.number = *next++;
+  std::vector<cl_uchar> empty;
+  try {
+    empty = forget_points(partly);
+  } catch (...) {
+    give_back(numbers);
+    throw;
+  }
+  for (const auto& [table, brick] : whole) set_uniform(table, brick, false);
+  for (std::size_t n = 0; n < partly.size(); ++n) {
+    if (partly[n].was_full) set_entry(partly[n].table, partly[n].brick, partly[n].number);
+    if (empty[n]) set_uniform(partly[n].table, partly[n].brick, false);
+  }
+}
+
+/// @return whether no point of each brick is seen any more
+std::vector<cl_uchar> SeenPoints::forget_points(const std::vector<PartlyForgotten>& partly) {
+  if (partly.empty()) return {};
   std::vector<cl_int8> ranges;
   for (const PartlyForgotten& p : partly)
     ranges.push_back({{p.first.x(), p.first.y(), p.first.z(), p.number, p.last.x(), p.last.y(), p.last.z(), p.was_full ? 1 : 0}});
   const auto count = static_cast<cl_int>(ranges.size());
   DeviceArray<cl_int8> on_device(commands_);
   DeviceArray<cl_uchar> empty(commands_);
+  bricks_.grow(SEEN_WORDS * used_, bricks_.size());
   on_device.write(ranges);
   empty.resize(ranges.size());
   commands_.run("forgetting", "forget_points", SEEN_WORDS * ranges.size(), kGroup, on_device(), count, bricks_());
   commands_.run("forgetting", "find_empty_bricks", ranges.size(), kGroup, on_device(), count, bricks_(), empty());
-  const std::vector<cl_uchar> are_empty = empty.read(ranges.size());
-  for (std::size_t n = 0; n < are_empty.size(); ++n)
-    if (are_empty[n]) set_uniform(partly[n].table, partly[n].brick, false);
+  return empty.read(ranges.size());
+}
+
+std::vector<BlockKey> SeenPoints::blocks() const {
+  std::vector<BlockKey> blocks;
+  for (const auto& [block, table] : table_of_) blocks.push_back(block);
+  std::sort(blocks.begin(), blocks.end());
+  return blocks;
 }
 
 std::vector<BlockKey> SeenPoints::blocks_with_points() const {
@@ -249,7 +269,8 @@ std::vector<BlockKey> SeenPoints::blocks_with_points() const {
   return blocks;
 }
 
-std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector<BlockKey>& blocks) const {
+std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector<BlockKey>& blocks) {
+  send_entries("changes");
   const int bricks = bricks_of_block();
   std::vector<std::vector<std::uint8_t>> stored(blocks.size());
   std::vector<cl_int> mixed;
@@ -283,24 +304,39 @@ std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector
 
 void SeenPoints::add_blocks(const std::vector<SeenBlock>& blocks) {
   const auto bricks = static_cast<std::size_t>(bricks_of_block());
-  for (const auto& [block, bytes] : blocks) check_block(bytes, bricks);
-  std::vector<cl_int> numbers;
   std::vector<cl_ulong> words;
+  for (const auto& [block, bytes] : blocks) {
+    check_seen_block(bytes, bricks);
+    if (bytes.size() <= bricks) continue;
+    const std::size_t before = words.size();
+    words.resize(before + (bytes.size() - bricks) / sizeof(cl_ulong));
+    std::memcpy(&words[before], &bytes[bricks], bytes.size() - bricks);
+  }
+  send_entries("changes");
+  const std::vector<cl_int> numbers = take_bricks(words.size() / SEEN_WORDS);
+  try {
+    scatter(numbers, words);
+  } catch (...) {
+    give_back(numbers);
+    throw;
+  }
+  auto next = numbers.begin();  // nothing can fail from here on
   for (const auto& [block, bytes] : blocks) {
     drop_block(block);
     if (bytes.empty()) continue;
     const int own = table(block);
     for (std::size_t brick = 0; brick < bricks; ++brick) {
       if (bytes[brick] == SEEN_ALL) set_uniform(own, static_cast<int>(brick), true);
-      if (bytes[brick] == SEEN_MIXED) numbers.push_back(add_brick(own, static_cast<int>(brick)));
+      if (bytes[brick] == SEEN_MIXED) set_entry(own, static_cast<int>(brick), *next++);
     }
-    const std::size_t before = words.size();
-    words.resize(before + (bytes.size() - bricks) / sizeof(cl_ulong));
-    if (words.size() > before) std::memcpy(&words[before], &bytes[bricks], bytes.size() - bricks);
   }
-  send_entries("changes");
+}
+
+/// Writes the words of bricks that no entry has yet.
+void SeenPoints::scatter(std::vector<cl_int> numbers, const std::vector<cl_ulong>& words) {
   if (numbers.empty()) return;
   const auto count = static_cast<cl_int>(numbers.size());
+  bricks_.grow(SEEN_WORDS * used_, bricks_.size());
   gathered_.write(words);
   gathered_list_.send(std::move(numbers));
   commands_.run("changes", "scatter_bricks", words.size(), kGroup, gathered_list_(), count, gathered_(), bricks_());

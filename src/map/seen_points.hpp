@@ -4,8 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <functional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "common/shared.h"
@@ -19,29 +19,18 @@ namespace frontier_surfels {
 /// Distance of the points, unless a parameter says otherwise [edge of the smallest voxels].
 constexpr double kSeenSpacing = 2.5;
 
-/// Makes the bytes of a block brick by brick, in the order of its table.
-class SeenBlockBytes {
- public:
-  void add_uniform(std::uint8_t state) { states_.push_back(state); }
-
-  /// @param is_seen  of a point, numbered (z SEEN_BRICK + y) SEEN_BRICK + x
-  void add_points(const std::function<bool(int)>& is_seen);
-  std::vector<std::uint8_t> take();
-
- private:
-  std::vector<std::uint8_t> states_, words_;
-};
-
 /// What is remembered of a block, as SeenPoints::read_blocks() gives it.
 using SeenBlock = StoredBlock;
 
+/// If the device fails in a call, what is remembered is as before, with two exceptions: bricks that add_brick() has given stay, and
+/// forget() may have forgotten a part of what it was to forget.
 class SeenPoints {
  public:
   /// @param block_size  edge of the map's blocks [m]
   SeenPoints(Commands& commands, double block_size);
 
-  /// Chooses the lattice, unless choose_shift() has, or something is remembered: the distance of its points becomes a block's edge divided
-  /// by a power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
+  /// Chooses the lattice, unless choose_shift() has, or something has been remembered: the distance of its points becomes a block's edge
+  /// divided by a power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
   void choose_spacing(double spacing);
   void choose_shift(int shift);  ///< chooses the lattice of a saved map until clear(); nothing may be remembered
   static int shift_for_spacing(double block_size, double spacing);
@@ -49,7 +38,7 @@ class SeenPoints {
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
   bool empty() const { return table_of_.empty(); }
 
-  /// Sends the tables of a window's blocks, for questions about points in it.
+  /// Sends the tables of a window's blocks, for questions about points in it, and what send_entries() has not sent yet.
   void open_window(const MapWindow& window);
 
   /// Number of a block's table; made if the block has none.
@@ -65,18 +54,18 @@ class SeenPoints {
   void send_entries(const char* stage);
   /// @}
 
-  /// @name Whole blocks, for files and for the archive. Their bytes: a state for each brick (SEEN_NONE, SEEN_MIXED, SEEN_ALL), then the
-  /// words of the bricks with SEEN_MIXED.
+  /// @name Whole blocks, for files and for the archive: bytes as in seen_block.hpp
   /// @{
-  std::vector<BlockKey> blocks_with_points() const;                                               ///< sorted
-  std::vector<std::vector<std::uint8_t>> read_blocks(const std::vector<BlockKey>& blocks) const;  ///< no bytes: no point is seen
+  std::vector<BlockKey> blocks() const;              ///< with a table, even if none of their points is seen; sorted
+  std::vector<BlockKey> blocks_with_points() const;  ///< sorted
+  std::vector<std::vector<std::uint8_t>> read_blocks(const std::vector<BlockKey>& blocks);
 
   /// Puts blocks with these bytes in place of what is remembered of them. @throws FileError  the bytes are those of another lattice, or
   /// damaged
   void add_blocks(const std::vector<SeenBlock>& blocks);
   void drop_block(const BlockKey& block);
 
-  SeenSpace saved() const;  ///< all blocks
+  SeenSpace saved();  ///< all blocks
 
   /// @throws FileError  add_blocks() would refuse a block of it, or the lattice
   static void check(const SeenSpace& seen);
@@ -88,8 +77,7 @@ class SeenPoints {
 
   void clear();
 
-  std::size_t bytes() const;  ///< memory on the device and the host
-  std::size_t blocks() const { return table_of_.size(); }
+  std::size_t bytes() const;                                       ///< memory on the device and the host
   std::size_t bricks() const { return used_ - free_.size() - 2; }  ///< with points that are seen and points that are not
 
   const cl::Buffer& slots() const { return slots_(); }
@@ -101,17 +89,21 @@ class SeenPoints {
   /// A brick of which some points are forgotten: first, and one past the last along each axis.
   struct PartlyForgotten {
     int table, brick;
-    cl_int number;  ///< of its own brick
-    bool was_full;  ///< before it got that
+    cl_int number;  ///< of its own brick, be it a new one
+    bool was_full;  ///< all its points were seen: the brick is new
     Eigen::Array3i first, last;
   };
-  void forget_points(const std::vector<PartlyForgotten>& partly);
+  std::vector<PartlyForgotten> bricks_in(const Eigen::AlignedBox3d& box, std::vector<std::pair<int, int>>& whole) const;
+  std::vector<cl_uchar> forget_points(const std::vector<PartlyForgotten>& partly);
+  std::vector<cl_int> take_bricks(std::size_t count);
+  void give_back(const std::vector<cl_int>& bricks) { free_.insert(free_.end(), bricks.rbegin(), bricks.rend()); }
+  void scatter(std::vector<cl_int> numbers, const std::vector<cl_ulong>& words);
   void set_entry(int table, int brick, cl_int value);
 
   Commands& commands_;
   const double block_size_;  ///< [m]
   int shift_ = 2;
-  bool fixed_ = false;  ///< by choose_shift()
+  bool fixed_ = false;  ///< by choose_shift(), or because something has been remembered
   std::unordered_map<BlockKey, int> table_of_;
   std::vector<cl_int> tables_;          ///< the device's tables; the host is their master
   std::vector<int> full_bricks_;        ///< of each table: number of entries that are SEEN_BRICK_FULL
@@ -120,12 +112,14 @@ class SeenPoints {
   std::size_t used_ = 2;                ///< one past the last brick ever used; the first two stand for uniform bricks
   std::size_t sent_tables_ = 0;         ///< entries that the device has
   std::vector<cl_int> changed_places_;  ///< entries of the tables that the device does not have yet
+  std::vector<cl_int> new_bricks_;      ///< bricks that the device has not emptied yet
   SentArray<cl_int> slots_;
   SentArray<cl_int2> entries_;
+  SentArray<cl_int> new_bricks_list_;
   DeviceArray<cl_int> tables_on_device_;
   DeviceArray<cl_ulong> bricks_;
-  mutable DeviceArray<cl_ulong> gathered_;
-  mutable SentArray<cl_int> gathered_list_;
+  DeviceArray<cl_ulong> gathered_;
+  SentArray<cl_int> gathered_list_;
 };
 
 }  // namespace frontier_surfels

@@ -89,6 +89,9 @@ class SurfelMap {
   /// is lost until it is replaced again. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);
 
+  /// Says that the map is lost, until replace() or set_lost(false): what belongs to it is being replaced.
+  void set_lost(bool lost) { undo_.lost = lost; }
+
   /// @name Whole blocks, for the archive. Called between frames; adding or dropping a block closes the last frame's window.
   /// @{
   double block_size() const { return block_size_; }  ///< [m]

@@ -2,7 +2,7 @@
 
 namespace frontier_surfels {
 
-Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints& seen, const Limits& limits) {
+Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints* seen, const Limits& limits) {
   Frame frame = {};
   frame.grid = camera.grid();
   frame.limits = limits;
@@ -11,8 +11,8 @@ Frame make_frame(const Camera& camera, const MapWindow& window, const RecentView
   frame.T_local_camera = to_transform(window.T_camera_local().inverse());
   frame.own_view = views.own_view();
   frame.has_color = camera.has_color() ? 1 : 0;
-  frame.has_seen = seen.empty() ? 0 : 1;
-  frame.seen_shift = seen.shift();
+  frame.has_seen = seen == nullptr || seen->empty() ? 0 : 1;
+  frame.seen_shift = seen == nullptr ? 0 : seen->shift();
   return frame;
 }
 

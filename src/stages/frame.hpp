@@ -10,8 +10,8 @@
 
 namespace frontier_surfels {
 
-/// Makes the structure that every kernel of a frame is given (kernels/common/shared.h).
-Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints& seen, const Limits& limits);
+/// Makes the structure that every kernel of a frame is given (kernels/common/shared.h). @param seen  null: seen points are not asked
+Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints* seen, const Limits& limits);
 
 /// A bit for each voxel of the grid (kernels/common/grid.cl says where), or for each surfel of the window's pages.
 using BitField = DeviceArray<cl_ulong>;

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <utility>
 
+#include "map/seen_block.hpp"
 #include "map/surfel_packing.hpp"
 #include "map/view_packing.hpp"
 #include "storage/stored_block.hpp"
@@ -28,8 +30,13 @@ double distance(const Eigen::Vector3d& point, const BlockKey& cube, double size)
 
 }  // namespace
 
-MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views)
-    : map_(map), seen_(seen), views_(views), radius_(config.eviction_radius), folder_(config.map_folder, map.block_size()) {
+MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views, std::function<Blocks()> complete)
+    : map_(map),
+      seen_(seen),
+      views_(views),
+      complete_(std::move(complete)),
+      radius_(config.eviction_radius),
+      folder_(config.map_folder, map.block_size()) {
   for (const BlockKey& key : folder_.keys()) {
     if (is_view(key))
       old_views_.insert(number_of(key));
@@ -60,6 +67,7 @@ void MapArchive::choose_lattice() {
 void MapArchive::flush(std::uint32_t frame) {
   folder_.flush();
   map_.roll_back();
+  note_changed(complete_());
   write(unsaved());
   saved_ = frame;
   fault_ = nullptr;
@@ -67,7 +75,20 @@ void MapArchive::flush(std::uint32_t frame) {
   folder_.flush();
 }
 
-void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }
+bool MapArchive::is_stored(const BlockKey& block) const {
+  const auto region = stored_.find(region_of(block));
+  return region != stored_.end() && std::find(region->second.begin(), region->second.end(), block) != region->second.end();
+}
+
+void MapArchive::note_stored(const BlockKey& block) {
+  if (!is_stored(block) && folder_.contains(block)) stored_[region_of(block)].push_back(block);
+}
+
+void MapArchive::forget_stored(const BlockKey& block) {
+  const auto region = stored_.find(region_of(block));
+  region->second.erase(std::find(region->second.begin(), region->second.end(), block));
+  if (region->second.empty()) stored_.erase(region);
+}
 
 bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame) {
   if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
@@ -102,24 +123,24 @@ MapArchive::Blocks MapArchive::stored_near(const Eigen::Vector3d& camera, double
   return near;
 }
 
+/// First the seen points of all blocks, and then surfels block by block: if that fails half way, blocks have their seen points in memory
+/// and on disk, which does no harm.
 bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame) {
   const Blocks near = stored_near(camera, radius);
+  if (near.empty()) return false;
+  std::vector<StoredParts> parts;
   std::vector<SeenBlock> seen;
-  try {
-    for (const BlockKey& block : near) {
-      const StoredParts parts = parts_of(folder_.read(block));
-      map_.add_block(block, parts.surfels, frame);
-      seen.push_back({block, parts.seen});
-      const auto region = stored_.find(region_of(block));
-      region->second.erase(std::find(region->second.begin(), region->second.end(), block));
-      if (region->second.empty()) stored_.erase(region);
-    }
-  } catch (...) {
-    seen_.add_blocks(seen);  // of the blocks that are in memory now
-    throw;
+  const std::vector<std::vector<std::uint8_t>> in_memory = seen_.read_blocks(near);
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    parts.push_back(parts_of(folder_.read(near[n])));
+    seen.push_back({near[n], united(parts[n].seen, in_memory[n])});
   }
   seen_.add_blocks(seen);
-  return !near.empty();
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    map_.add_block(near[n], parts[n].surfels, frame);
+    forget_stored(near[n]);
+  }
+  return true;
 }
 
 /// Those a little further than `radius` stay where they are, so that none goes to and fro; and those that cannot be written.
@@ -143,6 +164,7 @@ bool MapArchive::evict(const Eigen::Vector3d& camera, double radius, std::uint32
 void MapArchive::save_some(std::uint32_t frame) {
   if (frame < saved_ + kSavePeriod && saved_ != 0) return;
   try {
+    note_changed(complete_());
     save(unsaved(), frame, frame);
   } catch (const std::exception&) {  // the device failed, and the frame is in the map already
     fault_ = std::current_exception();
@@ -181,12 +203,12 @@ void MapArchive::write(const Blocks& blocks) {
   saved_views_ = {kept.begin(), kept.end()};
 }
 
-/// Blocks with surfels, or in which something has been seen; sorted.
+/// Blocks with surfels, or with seen points, be it only room for them; sorted.
 MapArchive::Blocks MapArchive::in_memory() const {
   Blocks with_surfels;
   for (const auto& [block, pages] : map_.index().blocks()) with_surfels.push_back(block);
   std::sort(with_surfels.begin(), with_surfels.end());
-  const Blocks seen = seen_.blocks_with_points();
+  const Blocks seen = seen_.blocks();
   Blocks all;
   std::set_union(with_surfels.begin(), with_surfels.end(), seen.begin(), seen.end(), std::back_inserter(all));
   return all;
@@ -196,9 +218,21 @@ MapArchive::Blocks MapArchive::in_memory() const {
 std::vector<StoredBlock> MapArchive::read(const Blocks& blocks) const {
   std::vector<StoredBlock> stored = map_.read_blocks(blocks);
   std::vector<std::vector<std::uint8_t>> seen = seen_.read_blocks(blocks);
-  for (std::size_t n = 0; n < stored.size(); ++n) stored[n].second = join({seen_.shift(), std::move(stored[n].second), std::move(seen[n])});
+  for (std::size_t n = 0; n < stored.size(); ++n) {
+    StoredParts parts = {seen_.shift(), std::move(stored[n].second), std::move(seen[n])};
+    if (is_stored(blocks[n])) {
+      const StoredParts on_disk = parts_of(folder_.read(blocks[n]));
+      parts.surfels = on_disk.surfels;
+      parts.seen = united(on_disk.seen, parts.seen);
+    }
+    stored[n].second = join(parts);
+  }
   add_views(stored);
   return stored;
+}
+
+std::vector<std::uint8_t> MapArchive::united(const std::vector<std::uint8_t>& seen_a, const std::vector<std::uint8_t>& seen_b) const {
+  return united_seen_blocks(seen_a, seen_b, static_cast<std::size_t>(seen_.bricks_of_block()));
 }
 
 /// Adds the views that are kept but not on disk, and erases those on disk that are no longer kept.
@@ -226,12 +260,16 @@ void MapArchive::add_stored(SavedMap& map) const {
   Blocks blocks;
   for (const auto& [region, some] : stored_) blocks.insert(blocks.end(), some.begin(), some.end());
   std::sort(blocks.begin(), blocks.end());
+  std::map<BlockKey, std::vector<std::uint8_t>> seen;
+  for (SeenSpace::Block& block : map.seen.blocks) seen[{block.block[0], block.block[1], block.block[2]}] = std::move(block.bytes);
   for (const BlockKey& block : blocks) {
     const StoredParts parts = parts_of(folder_.read(block));
     const std::vector<Surfel> some = unpack_block(parts.surfels, block, map_.block_size());
     map.surfels.insert(map.surfels.end(), some.begin(), some.end());
-    if (!parts.seen.empty()) map.seen.blocks.push_back({{block.x, block.y, block.z}, parts.seen});
+    if (!parts.seen.empty()) seen[block] = united(parts.seen, seen[block]);
   }
+  map.seen.blocks.clear();
+  for (auto& [block, bytes] : seen) map.seen.blocks.push_back({{block.x, block.y, block.z}, std::move(bytes)});
 }
 
 void MapArchive::clear() {

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <optional>
 #include <set>
 #include <unordered_map>
@@ -18,12 +19,17 @@
 namespace frontier_surfels {
 
 /// Blocks come and go whole, once the camera has moved by half a block. All that has changed since the last time is written in one
-/// transaction, its surfels together with what has been seen there, every so many frames, and before a block of it leaves memory: the
-/// folder always holds the map as it was after some frame.
+/// transaction, surfels together with what has been seen and with the kept views, every so many frames, and before a block of it leaves
+/// memory: the folder always holds the map as it was after some frame.
+///
+/// Views are kept longer than the blocks that they have seen. When such a view is forgotten, memory gets seen points of blocks that are on
+/// disk: they are added to those on disk by the next save, or when the block comes back.
 class MapArchive {
  public:
+  /// @param complete  ends what the last frame has left to do; called before anything is written. It returns the blocks that it has changed
   /// @throws FileError  config.map_folder cannot be used
-  MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views);
+  MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, const RecentViews& views,
+             std::function<std::vector<BlockKey>()> complete);
   ~MapArchive();  ///< as flush(), but nobody is told if it fails
 
   /// Are there blocks of an earlier map?
@@ -38,7 +44,7 @@ class MapArchive {
   /// Notes blocks that have lost surfels, which no page that is left may tell, or in which more has been seen.
   void note_changed(const std::vector<BlockKey>& blocks) { noted_.insert(blocks.begin(), blocks.end()); }
 
-  /// Writes the blocks that have changed since the last time, if it is time to. A fault waits for the next frame's follow().
+  /// Writes what has changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
 
   /// The kept views of an earlier map, oldest first. @throws FileError
@@ -60,13 +66,16 @@ class MapArchive {
  private:
   using Blocks = std::vector<BlockKey>;
   void choose_lattice();
+  bool is_stored(const BlockKey& block) const;
   void note_stored(const BlockKey& block);
+  void forget_stored(const BlockKey& block);
   Blocks stored_near(const Eigen::Vector3d& camera, double radius) const;
   bool fetch(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   bool evict(const Eigen::Vector3d& camera, double radius, std::uint32_t frame);
   Blocks unsaved() const;
   Blocks in_memory() const;
   std::vector<StoredBlock> read(const Blocks& blocks) const;
+  std::vector<std::uint8_t> united(const std::vector<std::uint8_t>& seen_a, const std::vector<std::uint8_t>& seen_b) const;
   void add_views(std::vector<StoredBlock>& stored) const;
   void write(const Blocks& blocks);
   bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
@@ -74,6 +83,7 @@ class MapArchive {
   SurfelMap& map_;
   SeenPoints& seen_;
   const RecentViews& views_;
+  const std::function<Blocks()> complete_;
   const double radius_;  ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks

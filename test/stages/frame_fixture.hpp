@@ -35,7 +35,7 @@ class FrameFixture {
     seen_.open_window(map_.window());
     camera_->set_image(image);
     views_.set_current(image, T_world_camera);
-    frame_ = make_frame(*camera_, map_.window(), views_, seen_, limits_);
+    frame_ = make_frame(*camera_, map_.window(), views_, &seen_, limits_);
     return frame_;
   }
 
