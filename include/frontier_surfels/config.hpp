@@ -34,7 +34,7 @@ struct Config {
   int median_votes = 14;
 
   // Recent views (ours)
-  int recent_views = 700;
+  int recent_views = 250;
   double recent_view_distance = 0.005;
   double recent_view_angle = 0.4;
   bool seen_points = true;
