@@ -15,7 +15,7 @@
 
 namespace frontier_surfels {
 
-/// Small images and ranges. Few recent views, so that known space is computed from the surfels, including distant ones.
+/// Small images and ranges. Few recent views, so that seen points decide about known space.
 inline Config walking() {
   Config config = undecimated();
   config.z_max = 1.5;

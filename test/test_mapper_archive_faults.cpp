@@ -152,7 +152,7 @@ TEST_F(MapperArchive, FlushTellsThatTheEndOfTheMapCannotBeWritten) {
 }
 
 TEST_F(MapperArchive, ADeletedFolderIsTold) {
-  const Frames frames = walk_there(12);
+  const Frames frames = walk_there(60);  // as many as it takes until the thread in the background has tried to write
   Mapper mapper(walking(path_));
   mapper.integrate(frames[0].view());
   mapper.flush();
@@ -178,7 +178,10 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   std::size_t refused = 0;
   for (std::size_t n = there.size(); n < all.size(); ++n) {
     const bool now = n == there.size() + 20;
-    if (now) change_file("UPDATE blocks SET crc = ~crc");
+    if (now) {
+      mapper.flush();  // nobody else uses the file
+      change_file("UPDATE blocks SET crc = ~crc");
+    }
     for (int tries = 0; tries < 3 && now; ++tries) {
       const std::vector<Surfel> before = mapper.surfels();
       const std::string said = fault_of<FileError>([&] { mapper.integrate(there.front().view()); });
@@ -190,7 +193,10 @@ TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
       ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "after a refused frame";
       ++refused;
     }
-    if (now) change_file("UPDATE blocks SET crc = ~crc WHERE crc < 0");  // blocks that were written meanwhile are sound
+    if (now) {
+      mapper.flush();
+      change_file("UPDATE blocks SET crc = ~crc WHERE crc < 0");  // blocks that were written meanwhile are sound
+    }
     mapper.integrate(all[n].view());
     follower.apply(mapper.changes(follower.sequence()));
     ASSERT_TRUE(same(follower.surfels(), mapper.surfels())) << "frame " << n;
