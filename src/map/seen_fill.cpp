@@ -22,6 +22,9 @@ constexpr int kWhole = kPoints;                                // stands for all
 constexpr double kLeastWeight = 0.5;  // sum of the surfels' weights, which are 1 at most
 constexpr double kLeastDepth = 0.2;   // mean depth behind the discs [spacing]
 
+// Far from all surfels, the search would fill a box of any size. A room has 20 surfels a brick.
+constexpr std::size_t kMostBricks = 1000000;  // and one for each surfel
+
 enum : std::uint8_t { kOpen = 0, kSeen = 1, kUnseen = 2 };
 
 /// Points are numbered (z SEEN_BRICK + y) SEEN_BRICK + x.
@@ -40,7 +43,7 @@ class Filling {
     find_bricks();
     label_near_surfels();
     begin_search();
-    while (queued_seen_ > 0) search_next();
+    while (queued_seen_ > 0 && bricks_.size() < kMostBricks + surfels_.size()) search_next();
     return result();
   }
 

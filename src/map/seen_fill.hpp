@@ -9,7 +9,8 @@ namespace frontier_surfels {
 
 /// Points near surfels are seen if they lie before them: by the sign of a sum over the surfels around, each weighted by its distance. All
 /// other points get the label of the nearest of these, by a search that spreads from seen and unseen points at the same speed: a hole in
-/// the cloud lets little through.
+/// the cloud lets little through. The search ends, and leaves the rest unseen, when it has come so far from the surfels that it needs much
+/// more memory than they do.
 /// @param shift  logarithm of the number of bricks along a block's edge (SeenPoints)
 SeenSpace fill_seen(const std::vector<Surfel>& surfels, double block_size, int shift);
 
