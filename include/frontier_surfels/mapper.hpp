@@ -49,8 +49,8 @@ class Mapper {
   ///
   /// Any number of readers may follow the map: each begins with since = 0, and then gives the sequence number of its last Changes. Until a
   /// reader has been told that a surfel is gone, its id is not given again, be it by frames, reset or load. A reader that has not asked for
-  /// 1000 frames is forgotten, and so is one that begins with another number: of those pages of the map that have changed, it gets all ids
-  /// as removed, and then all surfels.
+  /// 1000 frames is forgotten. It gets the whole map when it asks again (Changes::since is 0), as its ids may belong to other surfels by
+  /// then. So does a reader that begins with a number other than 0, or with one that the map has not reached.
   Changes changes(std::uint64_t since) const;
 
   /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. With

@@ -274,10 +274,11 @@ void MapperRos::Impl::show_other_map() {
 
 void MapperRos::Impl::publish_changes() {
   if (!publisher_->wants_changes()) return;
-  const std::uint64_t since = publisher_->sequence();
-  if (since == mapper_.sequence()) return;
+  if (publisher_->sequence() == mapper_.sequence()) return;
   try {
-    publisher_->push(mapper_.changes(since), since, state_);
+    Changes changes = mapper_.changes(publisher_->sequence());
+    const std::uint64_t since = changes.since;  // 0 if the publisher has waited for so long that it must begin again
+    publisher_->push(std::move(changes), since, state_);
   } catch (const std::exception& fault) {
     ROS_ERROR_THROTTLE(5, "The map cannot be published: %s", fault.what());
   }
