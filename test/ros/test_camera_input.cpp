@@ -83,6 +83,28 @@ TEST_F(CameraInputs, TheMapperReadsTheMessagesOwnBytes) {
   EXPECT_FALSE(camera.input.next_stamp() || camera.input.take());
 }
 
+TEST_F(CameraInputs, SayWhyColourIsNotUsed) {
+  TestCamera camera(poses_, "left");
+  camera.add_info(info_message(10));
+  sensor_msgs::Image larger = color_message(10, "rgb8", {1, 2, 3}), unknown = color_message(11, "rgb9", {1, 2, 3});
+  larger.height *= 2;
+  larger.data.insert(larger.data.end(), larger.data.begin(), larger.data.end());
+  for (const sensor_msgs::Image& color : {larger, unknown, color_message(12, "rgb8", {1, 2, 3})})
+    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color), nullptr});
+  std::string faults[3];
+  for (std::string& fault : faults) {
+    camera.add(image_of("left", 10.0 + static_cast<double>(&fault - faults)));
+    const std::optional<CompleteImage> image = camera.input.take();
+    ASSERT_TRUE(image);
+    const CameraFrame frame(*image);
+    fault = frame.color_fault();
+    EXPECT_EQ(frame.view().color.has_value(), fault.empty());
+  }
+  EXPECT_NE(faults[0].find("4x6 pixels, the depth images 4x3"), std::string::npos) << faults[0];
+  EXPECT_NE(faults[1].find("'rgb9'"), std::string::npos) << faults[1];
+  EXPECT_EQ(faults[2], "");
+}
+
 TEST_F(CameraInputs, DoNotDisturbEachOthersStampsAndCameras) {
   TestCamera left(poses_, "left"), right(poses_, "right");
   left.add_info(info_message(1, 5));

@@ -77,6 +77,18 @@ TEST_F(Remarks, EveryUnusableImageHasAReasonAndFewAreWarnedOf) {
   EXPECT_EQ(warned_.size(), 2U);
 }
 
+TEST_F(Remarks, AWarningAboutPixelsHidesNoOther) {
+  on_millimetres(0);
+  on_millimetres(20000);
+  remarks_.warn_of_pixels("A colour image is not used: it is empty.", now_);
+  remarks_.warn_of_pixels("A colour image is not used: it is empty.", now_);
+  on_millimetres(21000);
+  ASSERT_EQ(warned_.size(), 3U);
+  EXPECT_TRUE(says(warned_[0], "no measurement"));
+  EXPECT_TRUE(says(warned_[1], "depth_unit"));
+  EXPECT_TRUE(says(warned_[2], "colour"));
+}
+
 TEST_F(Remarks, DistortionWithoutPIsToldOnce) {
   info_.D = {0.1, 0, 0, 0, 0};
   info_.P = {5, 0, 2, 0, 0, 6, 1, 0, 0, 0, 1, 0};

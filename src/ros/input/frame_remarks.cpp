@@ -15,15 +15,19 @@ std::string size_text(const std::pair<int, int>& size) { return std::to_string(s
 
 }  // namespace
 
-std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now) {
+std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now) {
   std::string all = about_pixels(frame.depth);
-  if (!all.empty() && pixel_warnings_.is_due(now)) warn_(all);
+  if (!all.empty()) warn_of_pixels(all, now);
   for (const std::string& remark : {about_distortion(info), about_size(frame.depth), about_motion(frame.T_world_camera)}) {
     if (remark.empty()) continue;
     warn_(remark);
     all += (all.empty() ? "" : " ") + remark;
   }
   return all;
+}
+
+void FrameRemarks::warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now) {
+  if (pixel_warnings_.due(sentence, now) > 0) warn_(sentence);
 }
 
 std::string FrameRemarks::about_pixels(const DepthImage& image) const {

@@ -12,7 +12,7 @@
 
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
-#include "ros/input/throttle.hpp"
+#include "ros/input/warning_throttle.hpp"
 
 namespace frontier_surfels {
 
@@ -23,11 +23,14 @@ class FrameRemarks {
 
   static constexpr int kStillFrames = 300;  ///< number of frames after which a camera that has not moved is remarked
 
-  /// @param warn  is given each remark as a sentence: one about pixels every few seconds, all others once
+  /// @param warn  is given each remark as a sentence: the same about pixels every few seconds at most, all others once
   FrameRemarks(const Config& config, Warn warn) : config_(config), warn_(std::move(warn)) {}
 
   /// @param info  of the frame. @return the remarks about this frame as sentences; empty if there are none
-  std::string on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now);
+  std::string on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now);
+
+  /// Warns of pixels of which on() does not know, as those of colour images. The same every few seconds at most.
+  void warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now);
 
   /// Forgets the frames, but not what has been remarked once.
   void forget();
@@ -40,7 +43,7 @@ class FrameRemarks {
 
   const Config config_;
   const Warn warn_;
-  Throttle pixel_warnings_{std::chrono::seconds(10)};
+  WarningThrottle pixel_warnings_{std::chrono::seconds(10)};
   std::deque<std::pair<int, int>> sizes_;  ///< the last sizes of images [pixel], each different from the one before
   std::optional<Eigen::Isometry3d> T_world_first_;
   int still_frames_ = 0;

@@ -49,9 +49,10 @@ void TransformListener::add(const geometry_msgs::TransformStamped& transform, co
   } catch (const std::exception& error) {
     fault = error.what();
   }
-  if (fault.empty() || !warnings_.is_due(Throttle::Clock::now())) return;
-  ROS_WARN("A transform from '%s' to '%s' is not used: %s. Correct it in the node that sends it, %s.", transform.child_frame_id.c_str(),
-           transform.header.frame_id.c_str(), fault.c_str(), sender.c_str());
+  if (fault.empty()) return;
+  const std::string warning = "A transform from '" + transform.child_frame_id + "' to '" + transform.header.frame_id +
+                              "' is not used: " + fault + ". Correct it in the node that sends it, " + sender + ".";
+  if (warnings_.due(warning, WarningThrottle::Clock::now()) > 0) ROS_WARN("%s", warning.c_str());
 }
 
 /// tf takes no transforms that are much older than those it has. They are forgotten when ROS time goes back.
