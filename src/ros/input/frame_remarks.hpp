@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/depth_census.hpp"
 #include "frontier_surfels/types.hpp"
 #include "ros/input/warning_throttle.hpp"
 
@@ -21,7 +22,8 @@ class FrameRemarks {
  public:
   using Warn = std::function<void(const std::string&)>;
 
-  static constexpr int kStillFrames = 300;  ///< number of frames after which a camera that has not moved is remarked
+  static constexpr int kStillFrames = 300;         ///< number of frames after which a camera that has not moved is remarked
+  static constexpr std::size_t kDepthFrames = 30;  ///< number of frames after which depths of which few are usable are remarked
 
   /// @param warn  is given each remark as a sentence: the same about pixels every few seconds at most, all others once
   FrameRemarks(const Config& config, Warn warn) : config_(config), warn_(std::move(warn)) {}
@@ -36,7 +38,7 @@ class FrameRemarks {
   void forget();
 
  private:
-  std::string about_pixels(const DepthImage& image) const;
+  std::string about_pixels(const DepthImage& image);
   std::string about_distortion(const sensor_msgs::CameraInfo& info);
   std::string about_size(const DepthImage& image);
   std::string about_motion(const Eigen::Isometry3d& T_world_camera);
@@ -44,6 +46,7 @@ class FrameRemarks {
   const Config config_;
   const Warn warn_;
   WarningThrottle pixel_warnings_{std::chrono::seconds(10)};
+  std::deque<DepthCensus> depths_;         ///< of the last kDepthFrames frames
   std::deque<std::pair<int, int>> sizes_;  ///< the last sizes of images [pixel], each different from the one before
   std::optional<Eigen::Isometry3d> T_world_first_;
   int still_frames_ = 0;
