@@ -123,7 +123,7 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
-  diagnostics_->set_map(mapper_.statistics());
+  diagnostics_->set_map(mapper_.statistics(), mapper_.size_on_disk());
   tell_parameters();
   poses_.start(nh_);
   for (const auto& camera : cameras_) camera->start(nh_, pnh_);
@@ -225,7 +225,7 @@ void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
     map.surfels = message.surfels;
     map.map_bytes = message.map_bytes;
     map.device_bytes = message.device_bytes;
-    diagnostics_->set_map(map);
+    diagnostics_->set_map(map, mapper_.size_on_disk());
   } catch (const DroppedFrame& fault) {
     drop(fault.result, fault.what());
   } catch (const BadFrame& fault) {
@@ -272,7 +272,7 @@ void MapperRos::Impl::show_other_map() {
   surfels_ = static_cast<std::uint32_t>(mapper_.size());
   sequence_ = mapper_.sequence();
   state_.stamp = ros::Time::now();
-  diagnostics_->set_map(mapper_.statistics());
+  diagnostics_->set_map(mapper_.statistics(), mapper_.size_on_disk());
 }
 
 void MapperRos::Impl::publish_changes() {

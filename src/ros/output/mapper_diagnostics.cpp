@@ -35,9 +35,9 @@ void MapperDiagnostics::warn(const FrameReport& report, Clock::time_point now) {
   ROS_WARN("%s (%zu depth image%s dropped)", report.reason.c_str(), count, count == 1 ? "" : "s");
 }
 
-void MapperDiagnostics::set_map(const Statistics& map) {
+void MapperDiagnostics::set_map(const Statistics& map, std::size_t on_disk) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  status_.set_map(map);
+  status_.set_map(map, on_disk);
 }
 
 void MapperDiagnostics::set_paused(bool paused) {

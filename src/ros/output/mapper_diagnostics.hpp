@@ -20,8 +20,8 @@ class MapperDiagnostics {
   /// Counts a frame. If it was dropped, warns with the reason, at most every few seconds for each kind of reason.
   void add(const FrameReport& report);
 
-  /// Sets the size of the map after a frame, a reset or a load.
-  void set_map(const Statistics& map);
+  /// Sets the size of the map after a frame, a reset or a load; see MappingStatus.
+  void set_map(const Statistics& map, std::size_t on_disk);
   void set_paused(bool paused);
   void set_map_folder_fault(const std::string& fault);  ///< empty: none
 
