@@ -231,6 +231,13 @@ class Processes(unittest.TestCase):
             for word in ('depth/image', '~update', '~get_surfels', 'z_max', 'tf_timeout'):
                 self.assertIn(word, result.stdout)
 
+    def test_unknown_arguments_are_refused(self):
+        program = find_node('frontier_surfels', 'mapper_node')[0]
+        for argument, remedy in (('depth/image=foo', 'write depth/image:=foo'), ('--hlep', 'mapper_node --help'), ('foo', 'mapper_node --help')):
+            result = subprocess.run([program, '__name:=unknown', 'a:=b', '_z_max:=2', argument], capture_output=True, text=True, timeout=TIMEOUT)
+            self.assertEqual((result.returncode, result.stdout), (2, ''))
+            self.assertRegex(result.stderr, rf"^There is no argument '{argument}': [^\n]*{remedy}[^\n]*\.\n$")
+
     def test_ends_without_a_frame(self):
         process = self.start('idle')
         Mapper('idle').wait_until_connected()
