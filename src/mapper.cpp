@@ -328,6 +328,7 @@ Statistics Mapper::statistics() const {
 }
 
 std::size_t Mapper::size() const { return impl_->map.size(); }
+std::size_t Mapper::size_on_disk() const { return impl_->archive ? impl_->archive->stored_size() : 0; }
 std::uint64_t Mapper::sequence() const { return impl_->sequence; }
 const Config& Mapper::config() const { return impl_->config; }
 std::string Mapper::device() const { return impl_->commands.device().description; }

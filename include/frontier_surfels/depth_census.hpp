@@ -17,6 +17,7 @@ struct DepthCensus {
   std::size_t saturated = 0;                               ///< 65535 in a 16-bit image
   std::size_t too_near = 0;                                ///< below z_min
   std::size_t too_far = 0;                                 ///< beyond z_max
+  std::size_t infinite = 0;                                ///< of these, +Inf: no surface within the camera's range
   bool in_metres = false;                                  ///< 32-bit image
   float nearest = std::numeric_limits<float>::infinity();  ///< smallest depth, usable or not [m]
   float farthest = 0;                                      ///< largest finite depth, usable or not [m]
@@ -32,6 +33,10 @@ struct DepthCensus {
 
 /// @param image  with data and a valid size
 DepthCensus count_depths(const DepthImage& image, const Config& config);
+
+/// A sentence about depths of which only few are usable, as with a wrong unit with which some happen to be in range; empty if enough are,
+/// or none is. Those of +Inf do not count. @param depths  of several images
+std::string few_usable(const DepthCensus& depths, const Config& config);
 
 /// "z_min = 0.4 m to z_max = 3 m", for messages.
 std::string depth_range(const Config& config);

@@ -81,7 +81,8 @@ class Mapper {
 
   /// Counts the surfels of surfels().
   Statistics statistics() const;
-  std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
+  std::size_t size() const;          ///< number of surfels in the map; with a map_folder, in memory
+  std::size_t size_on_disk() const;  ///< number of further surfels, which are in the map folder only
   std::uint64_t sequence() const;
   const Config& config() const;
 

@@ -10,6 +10,7 @@
 namespace frontier_surfels {
 namespace {
 
+constexpr double kFewUsable = 0.05;  // share of the measured depths
 constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
 std::string number(double value) { return rounded_text(value, 3); }
@@ -28,6 +29,7 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
     ++census.usable;
   } else {
     ++census.too_far;
+    census.infinite += std::isinf(depth);
   }
 }
 
@@ -59,6 +61,7 @@ DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   saturated += other.saturated;
   too_near += other.too_near;
   too_far += other.too_far;
+  infinite += other.infinite;
   in_metres = other.in_metres;
   nearest = std::min(nearest, other.nearest);
   farthest = std::max(farthest, other.farthest);
@@ -79,6 +82,14 @@ std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
     text += "32-bit images must be in metres, so correct their unit";
   }
   return text + ", or change z_min and z_max.";
+}
+
+std::string few_usable(const DepthCensus& depths, const Config& config) {
+  if (depths.usable == 0) return {};
+  const double share = static_cast<double>(depths.usable) / static_cast<double>(depths.measured() - depths.infinite);
+  if (share >= kFewUsable) return {};
+  return "Only " + number(100 * share) + " % of the measured depths are from " + depth_range(config) + ", all others " +
+         range_and_remedy(depths, config);
 }
 
 DepthCensus count_depths(const DepthImage& image, const Config& config) {

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 
-#include "frontier_surfels/number_text.hpp"
-
 namespace frontier_surfels::replay {
 namespace {
 
-constexpr double kFewUsable = 0.05;      // share of the measured depths
 constexpr double kStillDistance = 1e-4;  // [m], below the noise of any tracked pose
 constexpr double kStillRotation = 1e-4;  // largest difference of a rotation matrix' elements
 
@@ -38,15 +35,10 @@ void warn_of_depths(const Run& run, std::vector<std::string>& warnings) {
   }
 }
 
-/// Warns of a wrong unit with which some depths happen to be in range.
 void warn_of_few_depths(const Run& run, std::vector<std::string>& warnings) {
   DepthCensus all;
   for (const FrameRecord& frame : run.frames) all += frame.depths;
-  if (all.measured() == 0 || all.usable == 0) return;
-  const double share = static_cast<double>(all.usable) / static_cast<double>(all.measured());
-  if (share >= kFewUsable) return;
-  warnings.push_back("Only " + rounded_text(100 * share, 3) + " % of the measured depths are from " + depth_range(run.config) +
-                     ", all others " + range_and_remedy(all, run.config));
+  if (const std::string few = few_usable(all, run.config); !few.empty()) warnings.push_back(few);
 }
 
 }  // namespace

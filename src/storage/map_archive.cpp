@@ -49,7 +49,10 @@ void MapArchive::flush(std::uint32_t frame) {
   folder_.flush();
 }
 
-void MapArchive::note_stored(const BlockKey& block) { stored_[region_of(block)].push_back(block); }
+void MapArchive::note_stored(const BlockKey& block) {
+  stored_[region_of(block)].push_back(block);
+  stored_bytes_ += folder_.bytes(block);
+}
 
 bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame) {
   if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
@@ -88,6 +91,7 @@ bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32
   const Blocks near = stored_near(camera, radius);
   for (const BlockKey& block : near) {
     map_.add_block(block, folder_.read(block), frame);
+    stored_bytes_ -= folder_.bytes(block);
     const auto region = stored_.find(region_of(block));
     region->second.erase(std::find(region->second.begin(), region->second.end(), block));
     if (region->second.empty()) stored_.erase(region);
@@ -158,9 +162,12 @@ std::vector<Surfel> MapArchive::stored() const {
   return surfels;
 }
 
+std::size_t MapArchive::stored_size() const { return stored_bytes_ / sizeof(cl_uint4); }
+
 void MapArchive::clear() {
   folder_.clear();
   stored_.clear();
+  stored_bytes_ = 0;
   followed_.reset();
   shrunk_.clear();
   fault_ = nullptr;

@@ -48,6 +48,9 @@ class MapArchive {
   /// The surfels on disk only. @throws FileError
   std::vector<Surfel> stored() const;
 
+  /// Number of surfels on disk only, which costs nothing.
+  std::size_t stored_size() const;
+
   /// Forgets everything on disk.
   void clear();
 
@@ -64,6 +67,7 @@ class MapArchive {
   const double radius_;  ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
+  std::size_t stored_bytes_ = 0;                 ///< of these blocks
   std::optional<Eigen::Vector3d> followed_;      ///< where the camera was when blocks last came and went
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
   std::set<BlockKey> shrunk_;                    ///< since the last save

@@ -64,6 +64,12 @@ std::uint64_t MapFolder::bytes() const {
   return bytes_;
 }
 
+std::size_t MapFolder::bytes(BlockKey key) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto size = sizes_.find(key);
+  return size == sizes_.end() ? 0 : size->second;
+}
+
 void MapFolder::write(std::vector<StoredBlock>&& blocks) {
   const std::size_t bytes = bytes_in_memory(blocks);
   std::unique_lock<std::mutex> lock(mutex_);

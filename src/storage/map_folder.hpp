@@ -32,9 +32,10 @@ class MapFolder {
 
   // From an index in memory, what is still queued included.
   bool contains(BlockKey key) const;
-  std::size_t size() const;            ///< blocks
-  std::vector<BlockKey> keys() const;  ///< sorted
-  std::uint64_t bytes() const;         ///< of all blocks
+  std::size_t size() const;               ///< blocks
+  std::vector<BlockKey> keys() const;     ///< sorted
+  std::uint64_t bytes() const;            ///< of all blocks
+  std::size_t bytes(BlockKey key) const;  ///< of one block; 0 if it is not there
 
   /// Queues blocks (without bytes: to be erased) to be written in one transaction by a thread in the background. Waits while more than
   /// 64 MB are queued.

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "frontier_surfels/depth_census.hpp"
-
 namespace frontier_surfels {
 namespace {
 
@@ -11,13 +9,19 @@ constexpr double kStillDistance = 1e-4;       // [m], below the noise of any tra
 constexpr double kStillRotation = 1e-4;       // largest difference of a rotation matrix' elements
 constexpr std::size_t kAlternatingSizes = 4;  // a camera whose mode is changed to and fro has fewer
 
+DepthCensus sum_of(const std::deque<DepthCensus>& images) {
+  DepthCensus sum;
+  for (const DepthCensus& image : images) sum += image;
+  return sum;
+}
+
 std::string size_text(const std::pair<int, int>& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
 
 }  // namespace
 
-std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now) {
+std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now) {
   std::string all = about_pixels(frame.depth);
-  if (!all.empty() && pixel_warnings_.is_due(now)) warn_(all);
+  if (!all.empty()) warn_of_pixels(all, now);
   for (const std::string& remark : {about_distortion(info), about_size(frame.depth), about_motion(frame.T_world_camera)}) {
     if (remark.empty()) continue;
     warn_(remark);
@@ -26,9 +30,15 @@ std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraI
   return all;
 }
 
-std::string FrameRemarks::about_pixels(const DepthImage& image) const {
+void FrameRemarks::warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now) {
+  if (pixel_warnings_.due(sentence, now) > 0) warn_(sentence);
+}
+
+std::string FrameRemarks::about_pixels(const DepthImage& image) {
   const DepthCensus depths = count_depths(image, config_);
-  if (depths.usable > 0) return {};
+  depths_.push_back(depths);
+  if (depths_.size() > kDepthFrames) depths_.pop_front();
+  if (depths.usable > 0) return depths_.size() < kDepthFrames ? std::string() : few_usable(sum_of(depths_), config_);
   if (depths.measured() == 0)
     return "The depth image has no measurement in any pixel (0 or NaN): check that the camera delivers depth and is not covered, and that "
            "depth/image is remapped to the right topic.";
@@ -70,6 +80,7 @@ std::string FrameRemarks::about_motion(const Eigen::Isometry3d& T_world_camera) 
 }
 
 void FrameRemarks::forget() {
+  depths_.clear();
   sizes_.clear();
   T_world_first_.reset();
   still_frames_ = 0;
