@@ -19,6 +19,8 @@ import PIL.Image
 import test_replay_score
 from test_replay_score import DONE, FAILED, SOURCES, WRONG_USAGE, read_json, read_rows, run
 
+NEW_FILES = ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt']  # of a run without scores, before its page is made
+
 
 def small_disk(size):
     """For preexec_fn: files of this process can have `size` bytes only."""
@@ -30,9 +32,10 @@ def small_disk(size):
 
 def read_folder(folder):
     content = {}
-    for name in os.listdir(folder):
-        with open(os.path.join(folder, name), 'rb') as file:
-            content[name] = file.read()
+    for entry in os.scandir(folder):
+        if entry.is_file():
+            with open(entry.path, 'rb') as file:
+                content[entry.name] = file.read()
     return content
 
 
@@ -126,20 +129,74 @@ class EarlierReport(unittest.TestCase):
             self.assertIn(process.returncode, (-signal.SIGINT, DONE))
             self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
 
-    def test_interrupt_while_the_page_is_made(self):
-        report = os.path.join(self.folder.name, "another user's report")
+    def start(self, report):
+        """Starts a run, and waits until it makes the page."""
         process = subprocess.Popen([test_replay_score.PROGRAM, self.room, '--report', report, *map(str, self.arguments[2:])], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True, start_new_session=True)
+        summary, children = os.path.join(report, 'unfinished_report', 'summary.json'), f'/proc/{process.pid}/task/{process.pid}/children'
         deadline = time.monotonic() + 60
-        while not os.path.exists(os.path.join(report, 'summary.json')) and time.monotonic() < deadline:
+        while process.poll() is None and time.monotonic() < deadline:
+            with open(children, encoding='utf-8') as file:
+                if os.path.exists(summary) and file.read():
+                    return process
             time.sleep(0.005)
+        process.kill()
+        self.fail(process.communicate())
+
+    def check_new_files_are_beside(self, files=tuple(NEW_FILES)):
+        """The earlier report stays as it is, and the new files are beside it."""
+        unfinished = os.path.join(self.report, 'unfinished_report')
+        self.addCleanup(shutil.rmtree, unfinished, ignore_errors=True)
+        self.assertEqual(sorted(os.listdir(unfinished)), sorted(files))
+        self.assertEqual(read_folder(self.report), self.before)
+
+    def test_interrupt_while_the_first_page_is_made(self):
+        report = os.path.join(self.folder.name, "another user's report")
+        process = self.start(report)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         _, errors = process.communicate(timeout=60)
         self.assertEqual(process.returncode, FAILED, errors)
         self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C[^\n]*\n$')
-        self.assertEqual(sorted(os.listdir(report)), ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt'])
+        self.assertEqual(sorted(os.listdir(report)), NEW_FILES)
         subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
         self.assertIn('report.html', os.listdir(report))
+
+    def test_interrupt_while_a_new_page_is_made(self):
+        process = self.start(self.report)
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, FAILED, errors)
+        self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C; the earlier report stays, [^\n]*\n$')
+        self.check_new_files_are_beside()
+        subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
+        self.check_new_files_are_beside([*NEW_FILES, 'report.html'])
+
+    def test_kill_while_a_new_page_is_made(self):
+        process = self.start(self.report)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        unfinished = os.path.join(self.report, 'unfinished_report', 'report.html.unfinished')
+        self.check_new_files_are_beside([*NEW_FILES, 'report.html.unfinished'] if os.path.exists(unfinished) else NEW_FILES)
+        result = run(self.room, *self.arguments)  # and the next run clears this up
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
+        type(self).before = read_folder(self.report)
+
+    def test_page_program_that_fails_or_is_missing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            copy = shutil.copy(test_replay_score.PROGRAM, folder)
+            script = os.path.join(folder, 'replay_report.py')  # a program looks for it beside itself first
+            for content, fault in [('raise SystemExit(1)', 'could not be made'), (None, 'needs the script')]:
+                if content:
+                    with open(script, 'w', encoding='utf-8') as file:
+                        file.write(content)
+                else:
+                    os.remove(script)
+                with self.subTest(fault=fault):
+                    result = subprocess.run([copy, self.room, *map(str, self.arguments)], capture_output=True, text=True, timeout=60)
+                    self.assertEqual(result.returncode, FAILED, result.stderr)
+                    self.assertRegex(result.stderr, f'^replay_score: report.html {fault}[^\n]*; the earlier report stays, and [^\n]*\n$')
+                    self.check_new_files_are_beside()
 
 
 class NothingUsable(unittest.TestCase):

@@ -193,6 +193,16 @@ void tell_skipped(const std::vector<std::string>& skipped) {
   if (skipped.size() > kShown) std::cerr << "... and " << skipped.size() - kShown << " more.\n";
 }
 
+/// Makes the page beside the other new files. They are kept if that fails.
+void make_page(ReportFolder& folder) {
+  try {
+    make_report_page(folder.unfinished(), folder.kept());
+  } catch (const Error&) {
+    folder.keep();
+    throw;
+  }
+}
+
 void replay_and_score(const Options& options) {
   catch_first_interrupt();
   auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
@@ -217,8 +227,8 @@ void replay_and_score(const Options& options) {
     const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
     write_file(folder.unfinished() / "sweep.json", sweep.dump(2) + "\n");
   }
+  make_page(folder);
   folder.commit();
-  make_report_page(options.report);
   std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
   if (!run.unsaved.empty()) throw FileError(run.unsaved);
   if (is_empty) throw empty_map(options.recording, summary);
