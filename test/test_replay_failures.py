@@ -4,6 +4,7 @@
 usage: test_replay_failures.py REPLAY_SCORE MAKE_SYNTHETIC
 """
 import os
+import re
 import resource
 import shutil
 import signal
@@ -61,6 +62,45 @@ class CommandLine(unittest.TestCase):
         to_bag = os.path.join(os.path.dirname(test_replay_score.PROGRAM), 'sequence_to_bag')
         if os.path.exists(to_bag):  # a build with ROS
             self.check(to_bag, ['room', 'x.bag', '--depht-topic', '/x'], r'There is no option --depht-topic; did you mean --depth-topic\?')
+
+    def programs(self):
+        """Name and path of those that are built."""
+        folder = os.path.dirname(test_replay_score.PROGRAM)
+        return {name: os.path.join(folder, name) for name in os.listdir(folder)}
+
+    def test_empty_paths_are_refused(self):
+        for program, arguments, name in [('replay_score', ['room', '--report', ''], '--report'), ('replay_score', ['', '--report', 'x'], 'INPUT'),
+                                         ('replay_score', ['room', '--report', 'x', '--config', ''], '--config'), ('make_synthetic', [''], 'OUT'),
+                                         ('sequence_to_bag', ['', 'x.bag'], 'FOLDER'), ('sequence_to_bag', ['room', ''], 'OUT.bag'),
+                                         ('bench', [''], 'INPUT'), ('bench', ['--json', ''], '--json'), ('bench', ['--config', ''], '--config')]:
+            if program in self.programs():
+                with self.subTest(program=program, arguments=arguments):
+                    self.check(self.programs()[program], arguments, name + r': must not be empty\.')
+        self.check(os.path.join(SOURCES, 'scripts', 'exploration_picture'), ['', 'x.png'], r'PROGRAMS and PICTURE must not be empty\.')
+        page = subprocess.run([os.path.join(SOURCES, 'scripts', 'replay_report.py'), ''], capture_output=True, text=True, timeout=60)
+        self.assertEqual(page.returncode, WRONG_USAGE, page.stderr)
+
+    def test_what_is_wrong_is_a_plain_sentence(self):
+        there = ['room', '--report', 'x']
+        for program, arguments, sentence in [
+                ('replay_score', [*there, '--first', '-3'], "--first: must be a whole number from 0 to 2147483647, not '-3'."),
+                ('replay_score', [*there, '--stride', '0'], "--stride: must be a whole number from 1 to 2147483647, not '0'."),
+                ('replay_score', [*there, '--first'], '--first needs a value.'),
+                ('replay_score', [*there, '--report', 'y'], '--report can be given only once.'),
+                ('replay_score', [*there, '--set', 'decimation=0'], 'decimation is 0 pixel: it must be from 1 to 64 pixel.'),
+                ('replay_score', [*there, '--sweep', 'th_d'], "--sweep 'th_d' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9."),
+                ('make_synthetic', ['x', '--frames', 'many'], "--frames: must be a whole number from 1 to 999999, not 'many'."),
+                ('make_synthetic', ['x', '--path', 'up'], "--path: must be orbit, explore, turn, walk or close, not 'up'."),
+                ('make_synthetic', ['x', '--dropouts', 'nan'], "--dropouts: must be a number from 0 to 0.9, not 'nan'."),
+                ('sequence_to_bag', ['x', 'x.bag', '--depth-unit', 'inf'], "--depth-unit: must be a number above 0, not 'inf'."),
+                ('sequence_to_bag', ['x', 'x.bag', '--encoding', 'rgb8'], "--encoding: must be 32FC1 or 16UC1, not 'rgb8'."),
+                ('bench', ['--row-seconds', '0'], "--row-seconds: must be a number above 0, not '0'.")]:
+            if program in self.programs():
+                with self.subTest(program=program, arguments=arguments):
+                    self.check(self.programs()[program], arguments, re.escape(sentence))
+        picture = os.path.join(SOURCES, 'scripts', 'exploration_picture')
+        self.check(picture, ['x', 'x.png', '--frames', '3'], r'--frames must be 4 or more\.')
+        self.check(picture, [], 'the following arguments are required: PROGRAMS, PICTURE')
 
 
 class EarlierReport(unittest.TestCase):
