@@ -123,6 +123,9 @@ void BagSource::choose_world(const std::string& wanted) {
   if (!first) throw Error(bag_.getFileName() + " has no images on " + topics_.depth + ".");
   const std::string camera = strip_slash(first.header().frame_id);
   world_ = strip_slash(wanted);
+  if (world_.empty() && camera.empty())
+    throw Error("The frame_id of the first image on " + topics_.depth +
+                " is empty: its driver must set it to the camera's optical frame; choose another topic with --depth-topic.");
   if (world_.empty()) world_ = transforms_.root_of(camera);
   if (world_ == camera)
     throw Error("The world frame '" + world_ +
@@ -155,9 +158,12 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   if (!image) throw BadFrame("it is a " + message.getDataType());
   const std_msgs::Header& header = image.header();
 
+  const std::string camera = strip_slash(header.frame_id);
+  if (camera.empty()) throw BadFrame("its frame_id is empty: its driver must set it to the camera's optical frame");
+
   RecordedFrame frame;
   frame.stamp = header.stamp.toSec();
-  frame.T_world_camera = transforms_.T_world_frame(world_, strip_slash(header.frame_id), header.stamp);
+  frame.T_world_camera = transforms_.T_world_frame(world_, camera, header.stamp);
   frame.depth = messages::copy(messages::depth_pixels(image).view);
   frame.intrinsics = intrinsics_at(header.stamp, frame.depth.size());
   if (color_images_) frame.color = color_at(header.stamp, frame.depth.size());

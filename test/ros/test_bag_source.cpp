@@ -70,6 +70,20 @@ TEST_F(BagTest, WithoutTransformsThereIsNoIdentity) {
   EXPECT_TRUE(says(failure(), "as its child"));
 }
 
+TEST_F(BagTest, AnEmptyFrameIdIsNamed) {
+  for (const char* name : {"", "/"}) {
+    sensor_msgs::Image nameless = depth_message(10.25);
+    nameless.header.frame_id = name;
+    Handmade(path_).add_camera_and_motion().add("/depth/image", 10.25, nameless);
+    EXPECT_TRUE(says(failure(), "The frame_id of the first image on /depth/image is empty: its driver must set it")) << failure();
+    Handmade(path_).add_camera_and_motion().add("/depth/image", 10, depth_message(10)).add("/depth/image", 10.25, nameless);
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 1u);
+    ASSERT_EQ(source->skipped().size(), 1u);
+    EXPECT_TRUE(says(source->skipped()[0], "its frame_id is empty")) << source->skipped()[0];
+  }
+}
+
 TEST_F(BagTest, DamagedTransformsAreLeftOut) {
   tf2_msgs::TFMessage no_rotation = tf_message(10.5, "world", "camera", 7);
   no_rotation.transforms[0].transform.rotation.w = 0;
@@ -133,7 +147,12 @@ TEST_F(BagTest, OtherMessagesWithoutATimeDoNoHarm) {
 
 TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}}) {
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F),
+                             {nan, 1.0F},
+                             {1.0F, nan},
+                             {std::numeric_limits<float>::infinity(), 0.0F},
+                             {-100.0F, 0.0F},
+                             {100.0F, 65535.0F}}) {
     Handmade(path_).add_camera_and_motion().add("/depth/image/compressedDepth", 10, compressed_depth(10, a, b));
     EXPECT_TRUE(says(failure(), "/depth/image/compressedDepth cannot be used: its depth quantisation"));
     Handmade(path_)
