@@ -13,6 +13,8 @@ namespace frontier_surfels {
 /// Number of the pixels that the mapper reads, by what they are. Depths that only carve free space are usable.
 struct DepthCensus {
   std::size_t usable = 0;
+  std::size_t carved = 0;                                  ///< of the usable ones: finite and beyond z_max
+  std::size_t no_return = 0;                               ///< of the usable ones: +Inf
   std::size_t missing = 0;                                 ///< 0, NaN or negative
   std::size_t saturated = 0;                               ///< 65535 in a 16-bit image
   std::size_t too_near = 0;                                ///< below z_min
@@ -32,6 +34,11 @@ struct DepthCensus {
 
 /// @param image  with data and a valid size
 DepthCensus count_depths(const DepthImage& image, const Config& config);
+
+/// A sentence about images of which nearly no measured depth is a surface from z_min to z_max, as with a wrong unit; empty if enough are.
+/// Looks also at depths that carve free space, but not at +Inf.
+/// @param depths  the sum over images with usable pixels
+std::string few_in_range(const DepthCensus& depths, const Config& config);
 
 /// "z_min = 0.4 m to z_max = 3 m", for messages.
 std::string depth_range(const Config& config);

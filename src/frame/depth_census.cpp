@@ -12,6 +12,8 @@ namespace {
 
 constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
+constexpr double kFewInRange = 0.05;  // share of the measured depths
+
 std::string number(double value) { return rounded_text(value, 3); }
 
 void count_depth(float depth, const Config& config, DepthCensus& census) {
@@ -24,8 +26,11 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
   const bool carves = std::isinf(depth) ? config.carve_no_return : config.carve_beyond_range && depth < kImplausible;
   if (depth < static_cast<float>(config.z_min)) {
     ++census.too_near;
-  } else if (depth <= static_cast<float>(config.z_max) || carves) {
+  } else if (depth <= static_cast<float>(config.z_max)) {
     ++census.usable;
+  } else if (carves) {
+    ++census.usable;
+    ++(std::isinf(depth) ? census.no_return : census.carved);
   } else {
     ++census.too_far;
   }
@@ -55,6 +60,8 @@ std::string DepthCensus::reason() const {
 
 DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   usable += other.usable;
+  carved += other.carved;
+  no_return += other.no_return;
   missing += other.missing;
   saturated += other.saturated;
   too_near += other.too_near;
@@ -79,6 +86,15 @@ std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
     text += "32-bit images must be in metres, so correct their unit";
   }
   return text + ", or change z_min and z_max.";
+}
+
+std::string few_in_range(const DepthCensus& depths, const Config& config) {
+  const std::size_t measured = depths.measured() - depths.no_return, in_range = depths.usable - depths.carved - depths.no_return;
+  if (measured == 0 || static_cast<double>(in_range) >= kFewInRange * static_cast<double>(measured)) return {};
+  const double percent = 100 * static_cast<double>(in_range) / static_cast<double>(measured);
+  const std::string carves = depths.carved > 0 ? ", and carve_beyond_range takes those beyond for free space" : "";
+  return (in_range == 0 ? "None" : "Only " + number(percent) + " %") + " of the measured depths are from " + depth_range(config) + carves +
+         (in_range == 0 ? ". All are " : ". All others are ") + range_and_remedy(depths, config);
 }
 
 DepthCensus count_depths(const DepthImage& image, const Config& config) {

@@ -165,17 +165,19 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   frame.stamp = header.stamp.toSec();
   frame.T_world_camera = transforms_.T_world_frame(world_, camera, header.stamp);
   frame.depth = messages::copy(messages::depth_pixels(image).view);
-  frame.intrinsics = intrinsics_at(header.stamp, frame.depth.size());
+  const sensor_msgs::CameraInfo& info = camera_at(header.stamp);
+  frame.intrinsics = messages::to_intrinsics(info, frame.depth.size());
   if (color_images_) frame.color = color_at(header.stamp, frame.depth.size());
+  for (std::string& remark : remarks_.on(frame.view().depth, info)) warnings_.push_back(std::move(remark));
   return frame;
 }
 
-/// The intrinsics of the latest camera_info at or before the stamp, or of the first one if there is none.
-Intrinsics BagSource::intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const {
+/// The latest camera_info at or before the stamp, or of the first one if there is none.
+const sensor_msgs::CameraInfo& BagSource::camera_at(const ros::Time& stamp) const {
   auto camera = std::upper_bound(cameras_.begin(), cameras_.end(), stamp,
                                  [](const ros::Time& value, const auto& element) { return value < element.first; });
   if (camera != cameras_.begin()) --camera;
-  return messages::to_intrinsics(camera->second, image_size);
+  return camera->second;
 }
 
 /// The colour image of a frame, or an empty one. A fault of a colour image never drops a frame.

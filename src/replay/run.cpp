@@ -53,6 +53,7 @@ Run new_run(const FrameSource& source, const Config& config, const std::string& 
 void finish_run(const FrameSource& source, Run& run) {
   run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
   run.notes = source.notes();
+  run.remarks = source.warnings();
 }
 
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,

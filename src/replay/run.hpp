@@ -74,6 +74,7 @@ struct Run {
   std::vector<FrameRecord> frames;
   std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
   std::vector<std::string> notes;    ///< see FrameSource
+  std::vector<std::string> remarks;  ///< the warnings of a FrameSource
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
@@ -84,7 +85,7 @@ struct Run {
 /// A run that has not begun: its date is now, and it knows where the poses come from.
 Run new_run(const FrameSource& source, const Config& config, const std::string& device);
 
-/// Adds the notes of the source, and its skipped frames to those of the mapper.
+/// Adds the notes and warnings of the source, and its skipped frames to those of the mapper.
 void finish_run(const FrameSource& source, Run& run);
 
 /// Maps the remaining frames of `source`. Does not set the surfels, the statistics and the peak memory of the result.

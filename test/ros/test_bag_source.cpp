@@ -166,6 +166,45 @@ TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
   }
 }
 
+TEST_F(BagTest, DistortionWithoutPIsToldOnce) {
+  sensor_msgs::CameraInfo info = info_message(10);
+  for (const bool distorts : {false, true}) {
+    info.D.assign(5, distorts ? 0.1 : 0);
+    Handmade(path_)
+        .add("/depth/camera_info", 10, info)
+        .add("/tf", 10, tf_message(10, "world", "camera", 0))
+        .add("/tf", 11, tf_message(11, "world", "camera", 1))
+        .add("/depth/image", 10.25, depth_message(10.25))
+        .add("/depth/image", 10.5, depth_message(10.5));
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 2u);
+    const auto warnings = source->warnings();
+    ASSERT_EQ(warnings.size(), distorts ? 1u : 0u);
+    for (const std::string& warning : warnings)
+      EXPECT_TRUE(says(warning, "taken as rectified, with K. If they are not, choose with --depth-topic"));
+  }
+}
+
+TEST_F(BagTest, AlternatingSizesAreToldOnce) {
+  Handmade bag(path_);
+  bag.add("/tf", 10, tf_message(10, "world", "camera", 0)).add("/tf", 11, tf_message(11, "world", "camera", 1));
+  for (int n = 0; n < 8; ++n) {
+    const double stamp = 10 + 0.1 * n;
+    sensor_msgs::CameraInfo info = info_message(stamp);
+    sensor_msgs::Image image = depth_message(stamp);
+    if (n % 2 == 1) {  // of a smaller camera
+      info.height = image.height = kHeight - 1;
+      image.data.resize(image.step * image.height);
+    }
+    bag.add("/depth/camera_info", stamp, info).add("/depth/image", stamp, image);
+  }
+  bag.close();
+  const auto source = open_source(path_);
+  EXPECT_EQ(read_all(*source).size(), 8u);
+  ASSERT_EQ(source->warnings().size(), 1u);
+  EXPECT_TRUE(says(source->warnings()[0], "4x3 and of 4x2 pixels alternate: do two cameras publish on the topic? Choose the topics"));
+}
+
 TEST_F(BagTest, AStillCameraGetsAListOfTheTransforms) {
   Handmade(path_)
       .add("/depth/camera_info", 10, info_message(10))

@@ -9,12 +9,37 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/depth_census.hpp"
 #include "frontier_surfels/types.hpp"
 #include "ros/input/throttle.hpp"
 
 namespace frontier_surfels {
+
+/// Looks at the camera_infos and the sizes of images that come as those of one camera.
+class CameraRemarks {
+ public:
+  /// @param choose_depth  how to choose other depth images, for instance "remap depth/image to"
+  /// @param choose_camera  the whole sentence that says how to choose the topics of one camera
+  CameraRemarks(std::string choose_depth, std::string choose_camera)
+      : choose_depth_(std::move(choose_depth)), choose_camera_(std::move(choose_camera)) {}
+
+  /// @param info  of the next image. @return remarks that were not made before, as sentences
+  std::vector<std::string> on(const DepthImage& image, const sensor_msgs::CameraInfo& info);
+
+  /// Forgets the images, but not what has been remarked.
+  void forget() { sizes_.clear(); }
+
+ private:
+  std::string about_distortion(const sensor_msgs::CameraInfo& info);
+  std::string about_size(const DepthImage& image);
+
+  const std::string choose_depth_, choose_camera_;
+  std::deque<std::pair<int, int>> sizes_;  ///< the last sizes of images [pixel], each different from the one before
+  bool distortion_told_ = false, sizes_told_ = false;
+};
 
 /// Looks at the frames of one camera. No ROS communication and no clock in it.
 class FrameRemarks {
@@ -22,6 +47,7 @@ class FrameRemarks {
   using Warn = std::function<void(const std::string&)>;
 
   static constexpr int kStillFrames = 300;  ///< number of frames after which a camera that has not moved is remarked
+  static constexpr int kFarFrames = 300;    ///< number of frames after which it is remarked if nearly no depth is in range
 
   /// @param warn  is given each remark as a sentence: one about pixels every few seconds, all others once
   FrameRemarks(const Config& config, Warn warn) : config_(config), warn_(std::move(warn)) {}
@@ -33,19 +59,20 @@ class FrameRemarks {
   void forget();
 
  private:
-  std::string about_pixels(const DepthImage& image) const;
-  std::string about_distortion(const sensor_msgs::CameraInfo& info);
-  std::string about_size(const DepthImage& image);
+  std::string about_pixels(const DepthCensus& depths) const;
+  std::string about_range(const DepthCensus& depths);
   std::string about_motion(const Eigen::Isometry3d& T_world_camera);
 
   const Config config_;
   const Warn warn_;
   Throttle pixel_warnings_{std::chrono::seconds(10)};
-  std::deque<std::pair<int, int>> sizes_;  ///< the last sizes of images [pixel], each different from the one before
+  CameraRemarks camera_remarks_{"remap depth/image to", "Remap depth/image and depth/camera_info to the topics of one camera."};
   std::optional<Eigen::Isometry3d> T_world_first_;
+  DepthCensus depths_;  ///< of the last frames with usable pixels, at most kFarFrames
+  int depths_frames_ = 0;
   int still_frames_ = 0;
   bool moved_ = false;
-  bool distortion_told_ = false, sizes_told_ = false, motion_told_ = false;
+  bool motion_told_ = false, range_told_ = false;
 };
 
 }  // namespace frontier_surfels
