@@ -16,6 +16,7 @@ replay::Run run_frames(Mapper& mapper, replay::FrameSource& source, const Option
   const auto stop = [&] { return replay::stop_requested() || Clock::now() > end; };
   const auto nothing = [](const DepthFrame&, replay::FrameRecord&) {};
   replay::Run run = replay::map_frames(mapper, source, after_frame ? after_frame : nothing, stop);
+  if (!run.unsaved.empty()) throw FileError(run.unsaved);
   if (run.frames.empty()) throw Error("No frame could be used" + (run.skipped.empty() ? "." : ": " + run.skipped.front()));
   return run;
 }
