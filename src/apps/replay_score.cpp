@@ -18,6 +18,7 @@
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
 #include "replay/sweep.hpp"
+#include "replay/warnings.hpp"
 #ifdef FRONTIER_SURFELS_WITH_ROS
 #include "ros/input/parameter_table.hpp"
 #endif
@@ -238,7 +239,7 @@ void replay_and_score(const Options& options) {
   folder.commit();
   std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
   if (!run.unsaved.empty()) throw FileError(run.unsaved);
-  if (is_empty) throw empty_map(options.recording, summary);
+  if (is_empty) throw empty_map(options.recording.path, warnings(run));
 }
 
 }  // namespace

@@ -2,10 +2,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <set>
 #include <thread>
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/paths.hpp"
@@ -83,6 +85,21 @@ bool wanted(const Options& options, const Section& section) {
   return options.sections.empty() || std::find(options.sections.begin(), options.sections.end(), section.name) != options.sections.end();
 }
 
+/// Prints what is wrong with the inputs, each sentence once. @throws EmptyMap if a map is empty
+void tell_faults(const ordered_json& sections) {
+  std::set<std::string> told;
+  std::string empty;
+  for (const auto& rows : sections) {
+    for (const auto& row : rows) {
+      if (row.contains("empty_map") && empty.empty()) empty = row["error"];
+      for (const std::string sentence : row.value("warnings", ordered_json::array()))
+        if (told.insert(row["input"].get<std::string>() + sentence).second)
+          std::cout << "WARNING     " << row["input"].get<std::string>() << ": " << sentence << "\n";
+    }
+  }
+  if (!empty.empty()) throw EmptyMap(empty);
+}
+
 void measure(const Options& options) {
   const std::vector<Input> inputs = open_inputs(options);
   const std::string device = Mapper(options.config).device();
@@ -106,6 +123,7 @@ void measure(const Options& options) {
   }
   json["complete"] = !replay::stop_requested();
   write();
+  tell_faults(json["sections"]);
   if (replay::stop_requested())
     std::cerr << "Stopped. What was measured so far is printed above, and is in the JSON file if --json was given.\n";
 }
