@@ -116,6 +116,9 @@ TEST(Warnings, AWrongUnitIsFoundIfFewDepthsAreInRange) {
   std::vector<float> pixels(100, 1500);
   pixels[7] = 1;
   expect_warning(run_of<float>({pixels}), {"Only 1 %", "look like millimetres"});
+  pixels.assign(100, kInfinity);
+  pixels[7] = 1;
+  EXPECT_TRUE(warnings(run_of<float>({pixels})).empty()) << "the camera looks into the open";
 }
 
 TEST(Warnings, AWrongUnitIsFoundIfFarDepthsCarve) {

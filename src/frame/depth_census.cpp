@@ -23,6 +23,7 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
   }
   census.nearest = std::min(census.nearest, depth);
   if (std::isfinite(depth)) census.farthest = std::max(census.farthest, depth);
+  if (std::isinf(depth)) ++census.infinite;
   const bool carves = std::isinf(depth) ? config.carve_no_return : config.carve_beyond_range && depth < kImplausible;
   if (depth < static_cast<float>(config.z_min)) {
     ++census.too_near;
@@ -30,7 +31,7 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
     ++census.usable;
   } else if (carves) {
     ++census.usable;
-    ++(std::isinf(depth) ? census.no_return : census.carved);
+    ++census.carved;
   } else {
     ++census.too_far;
   }
@@ -61,11 +62,11 @@ std::string DepthCensus::reason() const {
 DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   usable += other.usable;
   carved += other.carved;
-  no_return += other.no_return;
   missing += other.missing;
   saturated += other.saturated;
   too_near += other.too_near;
   too_far += other.too_far;
+  infinite += other.infinite;
   in_metres = other.in_metres;
   nearest = std::min(nearest, other.nearest);
   farthest = std::max(farthest, other.farthest);
@@ -89,12 +90,13 @@ std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
 }
 
 std::string few_in_range(const DepthCensus& depths, const Config& config) {
-  const std::size_t measured = depths.measured() - depths.no_return, in_range = depths.usable - depths.carved - depths.no_return;
-  if (measured == 0 || static_cast<double>(in_range) >= kFewInRange * static_cast<double>(measured)) return {};
-  const double percent = 100 * static_cast<double>(in_range) / static_cast<double>(measured);
-  const std::string carves = depths.carved > 0 ? ", and carve_beyond_range takes those beyond for free space" : "";
-  return (in_range == 0 ? "None" : "Only " + number(percent) + " %") + " of the measured depths are from " + depth_range(config) + carves +
-         (in_range == 0 ? ". All are " : ". All others are ") + range_and_remedy(depths, config);
+  const std::size_t measured = depths.measured() - depths.infinite, in_range = depths.usable - depths.carved;
+  if (depths.usable == 0 || measured == 0) return {};
+  const double share = static_cast<double>(in_range) / static_cast<double>(measured);
+  if (share >= kFewInRange) return {};
+  const std::string carves = config.carve_beyond_range ? ", and carve_beyond_range takes those beyond for free space" : "";
+  return (in_range == 0 ? "None" : "Only " + number(100 * share) + " %") + " of the measured depths are from " + depth_range(config) +
+         carves + (in_range == 0 ? ". All are " : ". All others are ") + range_and_remedy(depths, config);
 }
 
 DepthCensus count_depths(const DepthImage& image, const Config& config) {

@@ -25,6 +25,7 @@
 #include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
+#include "ros/input/warning_throttle.hpp"
 #include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
@@ -92,9 +93,10 @@ class MapperRos::Impl {
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
-  Mapper mapper_;                         // only used by the mapping thread
-  MapFolderWatch folder_watch_{mapper_};  // only used by the mapping thread
-  MapState state_;                        // only used by the mapping thread
+  Mapper mapper_;                                               // only used by the mapping thread
+  MapFolderWatch folder_watch_{mapper_};                        // only used by the mapping thread
+  MapState state_;                                              // only used by the mapping thread
+  WarningThrottle publishing_faults_{std::chrono::seconds(5)};  // only used by the mapping thread
   FramePoses poses_;
   std::atomic<std::uint32_t> surfels_{0};  ///< in the map, for reports of frames that are not mapped
   std::atomic<std::uint64_t> sequence_{0};
@@ -250,6 +252,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   message.header = header;
   message.result = FrameReport::INTEGRATED;
   message.reason = camera.remarks().on(frame, *image.info, Clock::now());
+  if (!pixels.color_fault().empty()) camera.remarks().warn_of_pixels(pixels.color_fault(), Clock::now());
   message.wait_ms = wait_ms;
   message.latency_ms = ms_since(image.arrival.time);
   return message;
@@ -279,7 +282,7 @@ void MapperRos::Impl::publish_changes() {
   try {
     publisher_->push(mapper_.changes(since), since, state_);
   } catch (const std::exception& fault) {
-    ROS_ERROR_THROTTLE(5, "The map cannot be published: %s", fault.what());
+    if (publishing_faults_.due(fault.what(), Clock::now()) > 0) ROS_ERROR("The map cannot be published: %s", fault.what());
   }
 }
 

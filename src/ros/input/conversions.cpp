@@ -234,6 +234,8 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
   return Eigen::Translation3d(translation) * rotation.normalized();
 }
 
+std::string late_stamp(const ros::Time& stamp) { return "its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038"; }
+
 std::string strip_slash(const std::string& name) {
   const std::size_t start = name.find_first_not_of('/');
   return start == std::string::npos ? std::string() : name.substr(start);

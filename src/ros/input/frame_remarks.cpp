@@ -9,6 +9,12 @@ constexpr double kStillDistance = 1e-4;       // [m], below the noise of any tra
 constexpr double kStillRotation = 1e-4;       // largest difference of a rotation matrix' elements
 constexpr std::size_t kAlternatingSizes = 4;  // a camera whose mode is changed to and fro has fewer
 
+DepthCensus sum_of(const std::deque<DepthCensus>& images) {
+  DepthCensus sum;
+  for (const DepthCensus& image : images) sum += image;
+  return sum;
+}
+
 std::string size_text(const std::pair<int, int>& size) { return std::to_string(size.first) + "x" + std::to_string(size.second); }
 
 }  // namespace
@@ -39,12 +45,12 @@ std::string CameraRemarks::about_size(const DepthImage& image) {
          " pixels alternate: do two cameras publish on the topic? " + choose_camera_;
 }
 
-std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now) {
+std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now) {
   const DepthCensus depths = count_depths(frame.depth, config_);
   std::string all = about_pixels(depths);
-  if (!all.empty() && pixel_warnings_.is_due(now)) warn_(all);
+  if (!all.empty()) warn_of_pixels(all, now);
   std::vector<std::string> remarks = camera_remarks_.on(frame.depth, info);
-  for (const std::string& remark : {about_range(depths), about_motion(frame.T_world_camera)})
+  for (const std::string& remark : {about_far(depths), about_motion(frame.T_world_camera)})
     if (!remark.empty()) remarks.push_back(remark);
   for (const std::string& remark : remarks) {
     warn_(remark);
@@ -53,8 +59,15 @@ std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraI
   return all;
 }
 
-std::string FrameRemarks::about_pixels(const DepthCensus& depths) const {
-  if (depths.usable > 0) return {};
+void FrameRemarks::warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now) {
+  if (pixel_warnings_.due(sentence, now) > 0) warn_(sentence);
+}
+
+std::string FrameRemarks::about_pixels(const DepthCensus& depths) {
+  depths_.push_back(depths);
+  if (depths_.size() > kDepthFrames) depths_.pop_front();
+  if (depths.usable > 0)  // about_far() judges far depths that carve
+    return depths_.size() < kDepthFrames || config_.carve_beyond_range ? std::string() : few_in_range(sum_of(depths_), config_);
   if (depths.measured() == 0)
     return "The depth image has no measurement in any pixel (0 or NaN): check that the camera delivers depth and is not covered, and that "
            "depth/image is remapped to the right topic.";
@@ -63,16 +76,16 @@ std::string FrameRemarks::about_pixels(const DepthCensus& depths) const {
   return "The depth image has no depth from " + depth_range(config_) + ", only depths " + range_and_remedy(depths, config_);
 }
 
-/// A camera may well look at nothing near for a while, so that many frames are judged together.
-std::string FrameRemarks::about_range(const DepthCensus& depths) {
-  if (range_told_ || depths.usable == 0) return {};
-  depths_ += depths;
-  if (++depths_frames_ < kFarFrames) return {};
-  const std::string few = few_in_range(depths_, config_);
-  depths_ = {};
-  depths_frames_ = 0;
+/// With carve_beyond_range a camera may well look at nothing near for a while, so that many frames are judged together.
+std::string FrameRemarks::about_far(const DepthCensus& depths) {
+  if (!config_.carve_beyond_range || far_told_ || depths.usable == 0) return {};
+  far_depths_ += depths;
+  if (++far_frames_ < kFarFrames) return {};
+  const std::string few = few_in_range(far_depths_, config_);
+  far_depths_ = {};
+  far_frames_ = 0;
   if (few.empty()) return {};
-  range_told_ = true;
+  far_told_ = true;
   return "In the last " + std::to_string(kFarFrames) + " frames: " + few;
 }
 
@@ -90,10 +103,11 @@ std::string FrameRemarks::about_motion(const Eigen::Isometry3d& T_world_camera) 
 }
 
 void FrameRemarks::forget() {
+  depths_.clear();
   camera_remarks_.forget();
   T_world_first_.reset();
-  depths_ = {};
-  depths_frames_ = 0;
+  far_depths_ = {};
+  far_frames_ = 0;
   still_frames_ = 0;
   moved_ = false;
 }

@@ -14,7 +14,7 @@
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/depth_census.hpp"
 #include "frontier_surfels/types.hpp"
-#include "ros/input/throttle.hpp"
+#include "ros/input/warning_throttle.hpp"
 
 namespace frontier_surfels {
 
@@ -46,33 +46,38 @@ class FrameRemarks {
  public:
   using Warn = std::function<void(const std::string&)>;
 
-  static constexpr int kStillFrames = 300;  ///< number of frames after which a camera that has not moved is remarked
-  static constexpr int kFarFrames = 300;    ///< number of frames after which it is remarked if nearly no depth is in range
+  static constexpr int kStillFrames = 300;         ///< number of frames after which a camera that has not moved is remarked
+  static constexpr std::size_t kDepthFrames = 30;  ///< number of frames after which depths of which few are usable are remarked
+  static constexpr int kFarFrames = 300;           ///< the same with carve_beyond_range: far depths are usual then
 
-  /// @param warn  is given each remark as a sentence: one about pixels every few seconds, all others once
+  /// @param warn  is given each remark as a sentence: the same about pixels every few seconds at most, all others once
   FrameRemarks(const Config& config, Warn warn) : config_(config), warn_(std::move(warn)) {}
 
   /// @param info  of the frame. @return the remarks about this frame as sentences; empty if there are none
-  std::string on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, Throttle::Clock::time_point now);
+  std::string on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now);
+
+  /// Warns of pixels of which on() does not know, as those of colour images. The same every few seconds at most.
+  void warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now);
 
   /// Forgets the frames, but not what has been remarked once.
   void forget();
 
  private:
-  std::string about_pixels(const DepthCensus& depths) const;
-  std::string about_range(const DepthCensus& depths);
+  std::string about_pixels(const DepthCensus& depths);
+  std::string about_far(const DepthCensus& depths);
   std::string about_motion(const Eigen::Isometry3d& T_world_camera);
 
   const Config config_;
   const Warn warn_;
-  Throttle pixel_warnings_{std::chrono::seconds(10)};
+  WarningThrottle pixel_warnings_{std::chrono::seconds(10)};
+  std::deque<DepthCensus> depths_;  ///< of the last kDepthFrames frames
   CameraRemarks camera_remarks_{"remap depth/image to", "Remap depth/image and depth/camera_info to the topics of one camera."};
   std::optional<Eigen::Isometry3d> T_world_first_;
-  DepthCensus depths_;  ///< of the last frames with usable pixels, at most kFarFrames
-  int depths_frames_ = 0;
+  DepthCensus far_depths_;  ///< of far_frames_ frames with usable pixels
+  int far_frames_ = 0;
   int still_frames_ = 0;
   bool moved_ = false;
-  bool motion_told_ = false, range_told_ = false;
+  bool motion_told_ = false, far_told_ = false;
 };
 
 }  // namespace frontier_surfels

@@ -37,7 +37,6 @@ class MappingStatus {
   /// Sets why the map folder cannot be written, which is an ERROR; empty: it can.
   void set_map_folder_fault(const std::string& fault);
 
-  std::uint64_t count(std::uint8_t result) const { return counts_[result]; }
   void fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now);
 
  private:
