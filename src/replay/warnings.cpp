@@ -35,10 +35,13 @@ void warn_of_depths(const Run& run, std::vector<std::string>& warnings) {
   }
 }
 
+/// Warns of a wrong unit with which some depths happen to be usable.
 void warn_of_few_depths(const Run& run, std::vector<std::string>& warnings) {
   DepthCensus all;
-  for (const FrameRecord& frame : run.frames) all += frame.depths;
-  if (const std::string few = few_usable(all, run.config); !few.empty()) warnings.push_back(few);
+  for (const FrameRecord& frame : run.frames)
+    if (frame.depths.usable > 0) all += frame.depths;
+  const std::string few = few_in_range(all, run.config);
+  if (!few.empty()) warnings.push_back(few);
 }
 
 }  // namespace
@@ -56,7 +59,8 @@ bool is_still(const std::vector<FrameRecord>& frames) {
 std::vector<std::string> warnings(const Run& run) {
   std::vector<std::string> all;
   warn_of_depths(run, all);
-  if (all.empty()) warn_of_few_depths(run, all);
+  warn_of_few_depths(run, all);
+  all.insert(all.end(), run.remarks.begin(), run.remarks.end());
   if (is_still(run.frames))
     all.push_back("The camera never moves: all " + std::to_string(run.frames.size()) + " frames have the same pose in the frame '" +
                   run.world_frame + "'" + (run.if_still.empty() ? "" : "; if it did move, " + run.if_still) + ".");

@@ -69,6 +69,26 @@ TEST_F(Remarks, MillimetresAreNotTakenForFreeSpace) {
   EXPECT_EQ(about(carving, 7.0F), "");
 }
 
+TEST_F(Remarks, FarDepthsThatCarveAreToldOnceIfNothingElseComes) {
+  config_.carve_beyond_range = true;
+  FrameRemarks carving(config_, [this](const std::string& remark) { warned_.push_back(remark); });
+  double x = 0;
+  const auto on_next = [&](int millimetres) { return about(carving, static_cast<std::uint16_t>(millimetres), 8, x += 0.01); };
+  for (int n = 1; n < FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "") << n;
+  EXPECT_TRUE(says(on_next(20000), "None of the measured depths are from z_min"));
+  EXPECT_TRUE(says(warned_.back(), "correct depth_unit"));
+  for (int n = 0; n < 2 * FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "");
+  EXPECT_EQ(warned_.size(), 1U);
+}
+
+TEST_F(Remarks, ACameraMayLookAtAFarWallForAWhile) {
+  config_.carve_beyond_range = true;
+  FrameRemarks carving(config_, [](const std::string&) {});
+  double x = 0;
+  for (int n = 0; n < 4 * FrameRemarks::kFarFrames; ++n)
+    ASSERT_EQ(about(carving, static_cast<std::uint16_t>(n % 10 == 0 ? 1500 : 20000), 8, x += 0.01), "");
+}
+
 /// The pixels are all the same, so every n-th frame stands for every n-th pixel.
 TEST_F(Remarks, AWrongUnitIsFoundAlsoIfFewDepthsAreInRange) {
   for (std::size_t n = 1; n < FrameRemarks::kDepthFrames; ++n) on(1500.0F);
