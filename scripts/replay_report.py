@@ -245,7 +245,7 @@ def write_page(path, html):
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1].startswith('-'):
+    if len(sys.argv) != 2 or not sys.argv[1] or sys.argv[1].startswith('-'):
         print('usage: replay_report.py DIR\n' + __doc__, file=sys.stderr)
         return 2
     folder = sys.argv[1]

@@ -2,6 +2,7 @@
 import io
 
 import matplotlib
+import numpy
 matplotlib.use('Agg')
 from matplotlib import pyplot, ticker  # noqa: E402: the backend must be chosen first
 
@@ -34,8 +35,15 @@ def warm(frames):
 
 
 def top_of_stages(frames):
-    """Upper end of an axis on which the frames that count fill the height: the first ones take many times as long."""
-    return 1.05 * max(warm(frames)['total'].max(), 1e-3)
+    """Upper end of an axis on which the frames that count fill the height: the first ones, and single ones for which kernels are compiled,
+    take many times as long. 'Whole frame' shows them."""
+    times = warm(frames)['total']
+    return 1.05 * max(min(times.max(), 3 * numpy.percentile(times, 95)), 1e-3)
+
+
+def title_of_stages(frames):
+    beyond = int((frames['total'] > top_of_stages(frames)).sum())
+    return 'Stages' if beyond == 0 else f'Stages ({beyond} of the frames took longer)'
 
 
 def time_per_frame(frames, stages):
@@ -44,7 +52,8 @@ def time_per_frame(frames, stages):
     index = range(len(frames))
     stacked.stackplot(index, [frames[name] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)
     stacked.plot(index, frames['total'], color=TOTAL, linewidth=0.8, label='total (wall)')
-    stacked.set(xlabel='frame', ylabel='time [ms]', title='Stages', xlim=(0, max(len(frames) - 1, 1)), ylim=(0, top_of_stages(frames)))
+    stacked.set(xlabel='frame', ylabel='time [ms]', title=title_of_stages(frames), xlim=(0, max(len(frames) - 1, 1)),
+                ylim=(0, top_of_stages(frames)))
     handles, labels = stacked.get_legend_handles_labels()
     stacked.legend(handles[::-1], labels[::-1], fontsize=7, loc='center left', bbox_to_anchor=(1, 0.5), handlelength=1)
 

@@ -279,10 +279,11 @@ Changes Mapper::changes(std::uint64_t since) const {
 
 Changes Mapper::Impl::changes(std::uint64_t since) {
   begin_call();
-  const bool given_again = since != 0 && !readers.knows(since);
+  const std::uint64_t begin = readers.knows(since) && since <= sequence ? since : 0;
   // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
-  const bool last_frame = frame_on_device == sequence && since + 1 == sequence && !given_again;
-  Changes changes = last_frame ? map.last_changes() : map.changes(since, given_again);
+  const bool last_frame = frame_on_device == sequence && begin != 0 && begin + 1 == sequence;
+  Changes changes = last_frame ? map.last_changes() : map.changes(begin);
+  changes.since = begin;
   changes.sequence = sequence;
   ChangeReaders told = readers;
   told.note(since, sequence);
@@ -383,6 +384,7 @@ Statistics Mapper::statistics() const {
 }
 
 std::size_t Mapper::size() const { return impl_->map.size(); }
+std::size_t Mapper::size_on_disk() const { return impl_->archive ? impl_->archive->stored_size() : 0; }
 std::uint64_t Mapper::sequence() const { return impl_->sequence; }
 const Config& Mapper::config() const { return impl_->config; }
 std::string Mapper::device() const { return impl_->commands.device().description; }

@@ -6,10 +6,14 @@ usage: test_bench.py BENCH MAKE_SYNTHETIC BENCH_TABLE
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
+
+import numpy
+import PIL.Image
 
 PROGRAM, MAKE_SYNTHETIC, BENCH_TABLE = None, None, None
 DONE, FAILED, WRONG_USAGE = 0, 1, 2
@@ -73,6 +77,27 @@ class Bench(unittest.TestCase):
         bench, _, _ = self.measure('--only', 'octomap', '--frames', 2, '--octomap-frames', 1)
         self.assertEqual(list(bench['sections']), ['octomap'])
         self.assertEqual(bench['sections']['octomap'][0]['frames'], 1)
+
+    def test_faults_of_the_input_are_told_as_by_replay_score(self):
+        path, folder = os.path.join(self.folder.name, 'faults.json'), os.path.join(self.folder.name, 'faults')
+        for fault, code, sentence in [(lambda depth: 0 * depth, FAILED, '3 of 3 depth images have no measurement in any pixel'),
+                                      (lambda depth: numpy.where(depth % 50 == 0, depth, 60000), DONE, 'Only [0-9.]+ % of the measured depths are from')]:
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.copytree(self.room, folder)
+            for name in os.listdir(os.path.join(folder, 'depth')):
+                image = os.path.join(folder, 'depth', name)
+                depth = numpy.array(PIL.Image.open(image)).astype(int)
+                PIL.Image.fromarray(fault(depth).astype(numpy.uint16)).save(image)
+            for section in ('frames', 'stages', 'octomap', 'map_size', 'memory'):
+                if section == 'stages' and code == DONE:
+                    continue  # has no figures of the whole recording
+                with self.subTest(sentence=sentence, section=section):
+                    result = run('--quick', '--only', section, '--json', path, '--', folder)
+                    self.assertEqual(result.returncode, code, result.stderr)
+                    if code == FAILED:
+                        self.assertRegex(result.stderr, rf"^bench: The map of '{folder}' is empty\. {sentence}[^\n]*\n$")
+                    else:
+                        self.assertRegex(result.stdout, f'WARNING +faults: {sentence}')
 
     def test_wrong_usage(self):
         for text in ['--no-such-option', '--only no_such', '--frames -1', '--octomap-frames many', '--row-seconds 0']:

@@ -137,7 +137,7 @@ TEST_P(MapFiles, WriteErrorsNameThePathAndTheReason) {
   const std::string nowhere = (folder_ / "no" / ("map" + ending_)).string();
   EXPECT_EQ(write_fault(nowhere, some_surfels(1)), "The map cannot be written to " + nowhere + ": No such file or directory.");
   fs::create_directory(path_);
-  EXPECT_TRUE(contains(write_fault(path_, some_surfels(1)), "no ordinary file"));
+  EXPECT_TRUE(contains(write_fault(path_, some_surfels(1)), "it is a folder; give the name of a file."));
   const fs::path device = folder_ / ("device" + ending_);
   fs::create_symlink("/dev/full", device);
   EXPECT_TRUE(contains(write_fault(device.string(), some_surfels(1)), "no ordinary file"));

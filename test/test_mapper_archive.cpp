@@ -28,6 +28,7 @@ TEST_F(MapperArchive, ThereAndBackGivesTheSameMap) {
     follower.apply(mapper.changes(follower.sequence()));
     ASSERT_TRUE(same(follower.surfels(), near)) << "followed to frame " << n;
     ASSERT_LT(furthest(near, frames[n]), 9.0F) << "frame " << n;
+    ASSERT_EQ(mapper.size() + mapper.size_on_disk(), plain.size()) << "frame " << n;
     moves += near.size() < plain.size();
     if (n % 40 != 0 && n + 1 != frames.size()) continue;
     ASSERT_TRUE(same(saved(mapper), sorted(plain.surfels()))) << "frame " << n;
@@ -82,6 +83,7 @@ TEST_F(MapperArchive, AReopenedFolderGoesOnWithItsMap) {
 
   Mapper mapper(walking(path_));
   EXPECT_EQ(mapper.size(), 0u) << "nothing is near before the first frame";
+  EXPECT_EQ(mapper.size_on_disk(), before.size());
   EXPECT_TRUE(same(saved(mapper), before));
   EXPECT_TRUE(same(sorted(mapper.whole_map()), before));
   const Report again = mapper.integrate(frames[0].view());
@@ -107,7 +109,7 @@ TEST_F(MapperArchive, ResetAndLoadReplaceTheMapOnDiskToo) {
     EXPECT_TRUE(same(saved(mapper), sorted(first.surfels())));
     integrate_all(mapper, frames);
     mapper.reset();
-    EXPECT_EQ(mapper.size(), 0u);
+    EXPECT_EQ(mapper.size() + mapper.size_on_disk(), 0u);
     EXPECT_TRUE(saved(mapper).empty());
     mapper.load(file);
     Follower follower;

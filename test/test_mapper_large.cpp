@@ -87,11 +87,16 @@ TEST(MapperLarge, AMapElsewhereDoesNotMatter) {
   EXPECT_EQ(large.size(), far + near.size());
   const std::vector<Surfel> loaded = large.surfels();
   EXPECT_TRUE(all_sound(loaded));
+  const std::uint64_t first = large.changes(0).sequence;
+  std::uint64_t told = large.changes(0).sequence;  // two subscribers
   for (std::size_t n = 3; n < frames.size(); ++n) {
     const Report a = alone.integrate(frames[n].view()), b = large.integrate(frames[n].view());
     EXPECT_TRUE(a.created == b.created && a.removed == b.removed && a.split == b.split && a.in_view == b.in_view);
     EXPECT_EQ(b.surfels, a.surfels + far);
-    EXPECT_LT(large.changes(large.sequence() - 1).updated.size(), near.size() + b.created) << "more than the frame has changed";
+    const Changes changes = large.changes(told);
+    EXPECT_EQ(changes.since, told);
+    EXPECT_LT(changes.updated.size(), near.size() + b.created) << "more than the frame has changed";
+    told = changes.sequence;
   }
   const std::vector<Surfel> after = large.surfels();
   EXPECT_TRUE(same(sorted_near(alone.surfels()), sorted_near(after)));
@@ -105,10 +110,10 @@ TEST(MapperLarge, AMapElsewhereDoesNotMatter) {
   Follower late, other;
   late.apply(large.changes(0));
   EXPECT_TRUE(same(after, late.surfels()));
-  Changes first;
-  first.updated = loaded;
-  other.apply(first);
-  const Changes changes = large.changes(1);
+  Changes then;
+  then.updated = loaded;
+  other.apply(then);
+  const Changes changes = large.changes(first);
   other.apply(changes);
   EXPECT_TRUE(same(after, other.surfels()));
   EXPECT_LT(changes.updated.size(), after.size() - far + 1);

@@ -4,6 +4,7 @@
 usage: test_replay_failures.py REPLAY_SCORE MAKE_SYNTHETIC
 """
 import os
+import re
 import resource
 import shutil
 import signal
@@ -19,6 +20,8 @@ import PIL.Image
 import test_replay_score
 from test_replay_score import DONE, FAILED, SOURCES, WRONG_USAGE, read_json, read_rows, run
 
+NEW_FILES = ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt']  # of a run without scores, before its page is made
+
 
 def small_disk(size):
     """For preexec_fn: files of this process can have `size` bytes only."""
@@ -30,9 +33,10 @@ def small_disk(size):
 
 def read_folder(folder):
     content = {}
-    for name in os.listdir(folder):
-        with open(os.path.join(folder, name), 'rb') as file:
-            content[name] = file.read()
+    for entry in os.scandir(folder):
+        if entry.is_file():
+            with open(entry.path, 'rb') as file:
+                content[entry.name] = file.read()
     return content
 
 
@@ -58,6 +62,45 @@ class CommandLine(unittest.TestCase):
         to_bag = os.path.join(os.path.dirname(test_replay_score.PROGRAM), 'sequence_to_bag')
         if os.path.exists(to_bag):  # a build with ROS
             self.check(to_bag, ['room', 'x.bag', '--depht-topic', '/x'], r'There is no option --depht-topic; did you mean --depth-topic\?')
+
+    def programs(self):
+        """Name and path of those that are built."""
+        folder = os.path.dirname(test_replay_score.PROGRAM)
+        return {name: os.path.join(folder, name) for name in os.listdir(folder)}
+
+    def test_empty_paths_are_refused(self):
+        for program, arguments, name in [('replay_score', ['room', '--report', ''], '--report'), ('replay_score', ['', '--report', 'x'], 'INPUT'),
+                                         ('replay_score', ['room', '--report', 'x', '--config', ''], '--config'), ('make_synthetic', [''], 'OUT'),
+                                         ('sequence_to_bag', ['', 'x.bag'], 'FOLDER'), ('sequence_to_bag', ['room', ''], 'OUT.bag'),
+                                         ('bench', [''], 'INPUT'), ('bench', ['--json', ''], '--json'), ('bench', ['--config', ''], '--config')]:
+            if program in self.programs():
+                with self.subTest(program=program, arguments=arguments):
+                    self.check(self.programs()[program], arguments, name + r': must not be empty\.')
+        self.check(os.path.join(SOURCES, 'scripts', 'exploration_picture'), ['', 'x.png'], r'PROGRAMS and PICTURE must not be empty\.')
+        page = subprocess.run([os.path.join(SOURCES, 'scripts', 'replay_report.py'), ''], capture_output=True, text=True, timeout=60)
+        self.assertEqual(page.returncode, WRONG_USAGE, page.stderr)
+
+    def test_what_is_wrong_is_a_plain_sentence(self):
+        there = ['room', '--report', 'x']
+        for program, arguments, sentence in [
+                ('replay_score', [*there, '--first', '-3'], "--first: must be a whole number from 0 to 2147483647, not '-3'."),
+                ('replay_score', [*there, '--stride', '0'], "--stride: must be a whole number from 1 to 2147483647, not '0'."),
+                ('replay_score', [*there, '--first'], '--first needs a value.'),
+                ('replay_score', [*there, '--report', 'y'], '--report can be given only once.'),
+                ('replay_score', [*there, '--set', 'decimation=0'], 'decimation is 0 pixel: it must be from 1 to 64 pixel.'),
+                ('replay_score', [*there, '--sweep', 'th_d'], "--sweep 'th_d' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9."),
+                ('make_synthetic', ['x', '--frames', 'many'], "--frames: must be a whole number from 1 to 999999, not 'many'."),
+                ('make_synthetic', ['x', '--path', 'up'], "--path: must be orbit, explore, turn, walk or close, not 'up'."),
+                ('make_synthetic', ['x', '--dropouts', 'nan'], "--dropouts: must be a number from 0 to 0.9, not 'nan'."),
+                ('sequence_to_bag', ['x', 'x.bag', '--depth-unit', 'inf'], "--depth-unit: must be a number above 0, not 'inf'."),
+                ('sequence_to_bag', ['x', 'x.bag', '--encoding', 'rgb8'], "--encoding: must be 32FC1 or 16UC1, not 'rgb8'."),
+                ('bench', ['--row-seconds', '0'], "--row-seconds: must be a number above 0, not '0'.")]:
+            if program in self.programs():
+                with self.subTest(program=program, arguments=arguments):
+                    self.check(self.programs()[program], arguments, re.escape(sentence))
+        picture = os.path.join(SOURCES, 'scripts', 'exploration_picture')
+        self.check(picture, ['x', 'x.png', '--frames', '3'], r'--frames must be 4 or more\.')
+        self.check(picture, [], 'the following arguments are required: PROGRAMS, PICTURE')
 
 
 class EarlierReport(unittest.TestCase):
@@ -126,20 +169,74 @@ class EarlierReport(unittest.TestCase):
             self.assertIn(process.returncode, (-signal.SIGINT, DONE))
             self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
 
-    def test_interrupt_while_the_page_is_made(self):
-        report = os.path.join(self.folder.name, "another user's report")
+    def start(self, report):
+        """Starts a run, and waits until it makes the page."""
         process = subprocess.Popen([test_replay_score.PROGRAM, self.room, '--report', report, *map(str, self.arguments[2:])], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True, start_new_session=True)
+        summary, children = os.path.join(report, 'unfinished_report', 'summary.json'), f'/proc/{process.pid}/task/{process.pid}/children'
         deadline = time.monotonic() + 60
-        while not os.path.exists(os.path.join(report, 'summary.json')) and time.monotonic() < deadline:
+        while process.poll() is None and time.monotonic() < deadline:
+            with open(children, encoding='utf-8') as file:
+                if os.path.exists(summary) and file.read():
+                    return process
             time.sleep(0.005)
+        process.kill()
+        self.fail(process.communicate())
+
+    def check_new_files_are_beside(self, files=tuple(NEW_FILES)):
+        """The earlier report stays as it is, and the new files are beside it."""
+        unfinished = os.path.join(self.report, 'unfinished_report')
+        self.addCleanup(shutil.rmtree, unfinished, ignore_errors=True)
+        self.assertEqual(sorted(os.listdir(unfinished)), sorted(files))
+        self.assertEqual(read_folder(self.report), self.before)
+
+    def test_interrupt_while_the_first_page_is_made(self):
+        report = os.path.join(self.folder.name, "another user's report")
+        process = self.start(report)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         _, errors = process.communicate(timeout=60)
         self.assertEqual(process.returncode, FAILED, errors)
         self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C[^\n]*\n$')
-        self.assertEqual(sorted(os.listdir(report)), ['frames.csv', 'summary.json', 'surfels.ply', 'trajectory.txt'])
+        self.assertEqual(sorted(os.listdir(report)), NEW_FILES)
         subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
         self.assertIn('report.html', os.listdir(report))
+
+    def test_interrupt_while_a_new_page_is_made(self):
+        process = self.start(self.report)
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, FAILED, errors)
+        self.assertRegex(errors, r'^replay_score: report.html is not made, because of Ctrl-C; the earlier report stays, [^\n]*\n$')
+        self.check_new_files_are_beside()
+        subprocess.run(errors.split('Try again with: ')[1], shell=True, check=True, timeout=60)
+        self.check_new_files_are_beside([*NEW_FILES, 'report.html'])
+
+    def test_kill_while_a_new_page_is_made(self):
+        process = self.start(self.report)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
+        unfinished = os.path.join(self.report, 'unfinished_report', 'report.html.unfinished')
+        self.check_new_files_are_beside([*NEW_FILES, 'report.html.unfinished'] if os.path.exists(unfinished) else NEW_FILES)
+        result = run(self.room, *self.arguments)  # and the next run clears this up
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertEqual(sorted(read_folder(self.report)), sorted(self.before))
+        type(self).before = read_folder(self.report)
+
+    def test_page_program_that_fails_or_is_missing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            copy = shutil.copy(test_replay_score.PROGRAM, folder)
+            script = os.path.join(folder, 'replay_report.py')  # a program looks for it beside itself first
+            for content, fault in [('raise SystemExit(1)', 'could not be made'), (None, 'needs the script')]:
+                if content:
+                    with open(script, 'w', encoding='utf-8') as file:
+                        file.write(content)
+                else:
+                    os.remove(script)
+                with self.subTest(fault=fault):
+                    result = subprocess.run([copy, self.room, *map(str, self.arguments)], capture_output=True, text=True, timeout=60)
+                    self.assertEqual(result.returncode, FAILED, result.stderr)
+                    self.assertRegex(result.stderr, f'^replay_score: report.html {fault}[^\n]*; the earlier report stays, and [^\n]*\n$')
+                    self.check_new_files_are_beside()
 
 
 class NothingUsable(unittest.TestCase):

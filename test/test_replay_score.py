@@ -320,12 +320,14 @@ class MapFolder(unittest.TestCase):
             self.assertEqual(again.returncode, FAILED, again.stdout)
             self.assertRegex(again.stderr, 'kept.*already has a map.*another')
 
-    def test_a_folder_that_is_deleted_meanwhile(self):
+    def delete_before_the_third_frame(self, *later):
+        """The result of a run whose map folder is deleted before the third frame, which is none. @param later  x of the poses that follow"""
         os.rename(os.path.join(self.recording, 'poses.txt'), os.path.join(self.recording, 'groundtruth.txt'))
         with open(os.path.join(self.recording, 'groundtruth.txt'), 'a', encoding='utf-8') as file:
-            file.write('2 200 0 0 0 0 0 1\n')
+            file.writelines(f'{2 + n} {x} 0 0 0 0 0 1\n' for n, x in enumerate([200, *later]))
         with open(os.path.join(self.recording, 'depth.txt'), 'w', encoding='utf-8') as file:
             file.write('0 depth/0000.png\n1 depth/0001.png\n2 fifo.png\n')
+            file.writelines(f'{3 + n} depth/0001.png\n' for n in range(len(later)))
         fifo = os.path.join(self.recording, 'fifo.png')  # replay_score waits here until somebody writes
         os.mkfifo(fifo)
 
@@ -336,10 +338,24 @@ class MapFolder(unittest.TestCase):
         threading.Thread(target=delete, daemon=True).start()  # waits for ever if replay_score fails before
         result = self.replay('--octomap-resolution', 0)
         self.assertEqual(result.returncode, FAILED, result.stderr)
+        return result
+
+    def test_a_folder_that_is_deleted_meanwhile(self):
+        result = self.delete_before_the_third_frame()
         sentence = f'The map folder lacks a part of the map. The map folder {self.kept} has been deleted, moved or replaced'
         self.assertIn(f'replay_score: {sentence}', result.stderr)
         self.assertIn(sentence, ' '.join(read_json(self.report)['warnings']), 'the report is written all the same')
         self.assertGreater(len(read_surfels(self.report)), 2000)
+
+    def test_a_frame_that_is_refused_because_of_the_folder_ends_the_run_with_a_report(self):
+        result = self.delete_before_the_third_frame(300, 400, 500, 600)
+        self.assertRegex(result.stderr, r'\nreplay_score: The map ends after [234] frames, and the map folder [^\n]*has been deleted[^\n]*\n$')
+        self.assertRegex(result.stdout, 'WARNING +The map ends after [234] frames')
+        summary = read_json(self.report)
+        self.assertIn(summary['input']['frames'], (2, 3, 4))
+        self.assertIn('The map ends after', ' '.join(summary['warnings']))
+        self.assertIn('report.html', os.listdir(self.report))
+        self.assertGreater(len(read_surfels(self.report)), 1000)
 
 
 class ReadmePicture(unittest.TestCase):

@@ -83,9 +83,9 @@ TEST(DepthCensus, ReadsStepsOfTheConfiguredUnit) {
 
 /// A run of frames with these pixels, whose camera moves.
 template <typename Pixel>
-Run run_of(const std::vector<std::vector<Pixel>>& images) {
+Run run_of(const std::vector<std::vector<Pixel>>& images, const Config& config = every_pixel()) {
   Run run;
-  run.config = every_pixel();
+  run.config = config;
   run.world_frame = "map";
   for (const auto& pixels : images) {
     FrameRecord frame;
@@ -116,6 +116,27 @@ TEST(Warnings, AWrongUnitIsFoundIfFewDepthsAreInRange) {
   std::vector<float> pixels(100, 1500);
   pixels[7] = 1;
   expect_warning(run_of<float>({pixels}), {"Only 1 %", "look like millimetres"});
+  pixels.assign(100, kInfinity);
+  pixels[7] = 1;
+  EXPECT_TRUE(warnings(run_of<float>({pixels})).empty()) << "the camera looks into the open";
+}
+
+TEST(Warnings, AWrongUnitIsFoundIfFarDepthsCarve) {
+  Config config = every_pixel();
+  config.carve_beyond_range = config.carve_no_return = true;
+  const std::vector<std::uint16_t> five_times_too_far(100, 20000), no_measurement(100, 0), right(100, 2000);
+  EXPECT_EQ(reason_of(five_times_too_far), "too_far");
+  expect_warning(run_of<std::uint16_t>({five_times_too_far, five_times_too_far}, config),
+                 {"None of the measured depths are from z_min", "takes those beyond for free space", "20 m", "correct depth_unit"});
+  EXPECT_EQ(warnings(run_of<std::uint16_t>({no_measurement, five_times_too_far}, config)).size(), 2u);
+  EXPECT_TRUE(warnings(run_of<std::uint16_t>({five_times_too_far, right}, config)).empty()) << "a far wall in one of two frames";
+  EXPECT_TRUE(warnings(run_of<float>({{kInfinity, kInfinity}}, config)).empty()) << "no return is what the option is for";
+}
+
+TEST(Warnings, ThoseOfTheSourceAreAmongThem) {
+  auto run = run_of<std::uint16_t>({{1000}, {1000}});
+  run.remarks = {"The camera_info is odd."};
+  expect_warning(run, {"The camera_info is odd."});
 }
 
 TEST(Warnings, StillCamera) {

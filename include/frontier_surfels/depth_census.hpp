@@ -13,10 +13,12 @@ namespace frontier_surfels {
 /// Number of the pixels that the mapper reads, by what they are. Depths that only carve free space are usable.
 struct DepthCensus {
   std::size_t usable = 0;
+  std::size_t carved = 0;                                  ///< of the usable ones: beyond z_max, they carve free space
   std::size_t missing = 0;                                 ///< 0, NaN or negative
   std::size_t saturated = 0;                               ///< 65535 in a 16-bit image
   std::size_t too_near = 0;                                ///< below z_min
   std::size_t too_far = 0;                                 ///< beyond z_max
+  std::size_t infinite = 0;                                ///< +Inf, usable or too far: no surface within the camera's range
   bool in_metres = false;                                  ///< 32-bit image
   float nearest = std::numeric_limits<float>::infinity();  ///< smallest depth, usable or not [m]
   float farthest = 0;                                      ///< largest finite depth, usable or not [m]
@@ -32,6 +34,10 @@ struct DepthCensus {
 
 /// @param image  with data and a valid size
 DepthCensus count_depths(const DepthImage& image, const Config& config);
+
+/// A sentence about images of which nearly no measured depth is a surface from z_min to z_max, as with a wrong unit; empty if enough are,
+/// or if no depth is usable. Depths that only carve free space are none, and those of +Inf do not count. @param depths  of several images
+std::string few_in_range(const DepthCensus& depths, const Config& config);
 
 /// "z_min = 0.4 m to z_max = 3 m", for messages.
 std::string depth_range(const Config& config);

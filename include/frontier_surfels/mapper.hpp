@@ -49,8 +49,8 @@ class Mapper {
   ///
   /// Any number of readers may follow the map: each begins with since = 0, and then gives the sequence number of its last Changes. Until a
   /// reader has been told that a surfel is gone, its id is not given again, be it by frames, reset or load. A reader that has not asked for
-  /// 1000 frames is forgotten, and so is one that begins with another number: of those pages of the map that have changed, it gets all ids
-  /// as removed, and then all surfels.
+  /// 1000 frames is forgotten. It gets the whole map when it asks again (Changes::since is 0), as its ids may belong to other surfels by
+  /// then. So does a reader that begins with a number other than 0, or with one that the map has not reached.
   Changes changes(std::uint64_t since) const;
 
   /// The whole map as files keep it, with what has been seen; with a map_folder, also what is on disk. @throws FileError
@@ -88,7 +88,8 @@ class Mapper {
 
   /// Counts the surfels of surfels().
   Statistics statistics() const;
-  std::size_t size() const;  ///< number of surfels in the map; with a map_folder, in memory
+  std::size_t size() const;          ///< number of surfels in the map; with a map_folder, in memory
+  std::size_t size_on_disk() const;  ///< number of further surfels, which are in the map folder only
   std::uint64_t sequence() const;
   const Config& config() const;
 

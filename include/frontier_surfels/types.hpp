@@ -102,10 +102,10 @@ constexpr double kNewRadius = 0.86602540378443865;
 
 /// Difference between the map at an earlier sequence number and the map now: first remove, then update.
 struct Changes {
-  std::uint64_t sequence = 0;          ///< of the map now
+  std::uint64_t sequence = 0;          ///< number of the map now
   std::vector<Surfel> updated;         ///< new or changed surfels
-  std::vector<std::uint32_t> removed;  ///< ids whose surfels are gone. An id that is updated as well belongs to another surfel now, which
-                                       ///< happens only to readers whom Mapper::changes() does not know
+  std::vector<std::uint32_t> removed;  ///< ids of surfels that are gone; Mapper::changes() never updates one of them as well
+  std::uint64_t since = 0;             ///< number of the earlier map; 0: this is the whole map, forget everything else
 };
 
 /// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size

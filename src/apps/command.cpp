@@ -1,8 +1,11 @@
 #include "apps/command.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
+
+#include "config/config_text.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -36,7 +39,63 @@ std::string nearest(const CLI::App& app, const std::string& name) {
   return best;
 }
 
+/// @param wanted  what the text must be. @param fits  whether a text is that
+template <typename Fits>
+CLI::Validator checked(const std::string& wanted, Fits fits) {
+  const auto check = [wanted, fits](const std::string& text) {
+    return fits(text) ? std::string() : "must be " + wanted + ", not '" + text + "'.";
+  };
+  return CLI::Validator(check, "");
+}
+
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t n = 0; n < words.size(); ++n) text += (n == 0 ? "" : n + 1 < words.size() ? ", " : " or ") + words[n];
+  return text;
+}
+
 }  // namespace
+
+CLI::Validator not_empty() {
+  return CLI::Validator([](const std::string& text) { return text.empty() ? "must not be empty." : std::string(); }, "");
+}
+
+CLI::Validator whole_number(int least, int most) {
+  return checked("a whole number from " + to_text(least) + " to " + to_text(most), [least, most](const std::string& text) {
+    int value = 0;
+    return from_text(text, value) && value >= least && value <= most;
+  });
+}
+
+CLI::Validator positive_number() {
+  return checked("a number above 0", [](const std::string& text) {
+    double value = 0;
+    return from_text(text, value) && std::isfinite(value) && value > 0;
+  });
+}
+
+CLI::Validator number(double least, double most) {
+  return checked("a number from " + to_text(least) + " to " + to_text(most), [least, most](const std::string& text) {
+    double value = 0;
+    return from_text(text, value) && value >= least && value <= most;
+  });
+}
+
+CLI::Validator one_of(const std::vector<std::string>& words) {
+  return checked(listed(words), [words](const std::string& text) { return std::find(words.begin(), words.end(), text) != words.end(); });
+}
+
+CLI::ValidationError wrong_usage(std::string sentences) {
+  while (!sentences.empty() && sentences.back() == '\n') sentences.pop_back();
+  return CLI::ValidationError(sentences, CLI::ExitCodes::ValidationError);
+}
+
+std::string sentence_of(const CLI::ParseError& error) {
+  const std::string text = error.what(), name = text.substr(0, text.find(':'));
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr || name == text) return text;
+  if (text.find("At Most") != std::string::npos) return name + " can be given only once.";
+  return name + " needs a value.";
+}
 
 void check_option_names(const CLI::App& app, const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {

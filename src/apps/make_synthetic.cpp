@@ -32,7 +32,7 @@ std::string read_size(const std::string& text, int& width, int& height) {
   char rest = 0;
   const bool well_formed = std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) == 2;
   const bool fits = well_formed && std::min(width, height) >= 8 && std::max(width, height) <= 8192;
-  return fits ? "" : "must be WIDTHxHEIGHT with 8 to 8192 pixels each, such as 640x480, not '" + text + "'";
+  return fits ? "" : "must be WIDTHxHEIGHT with 8 to 8192 pixels each, such as 640x480, not '" + text + "'.";
 }
 
 std::ofstream open_text(const fs::path& path) {
@@ -107,25 +107,25 @@ int main(int argc, char** argv) {
   CLI::App app("Writes a synthetic sequence of depth and colour images with exact poses: depth/, color/, poses.txt, camera.txt.",
                "make_synthetic");
   app.option_defaults()->always_capture_default();
-  app.add_option("OUT", options.output, "folder to write")->required();
-  app.add_option("--frames", options.frames, "number of frames along the whole path")->check(CLI::Range(1, 999999));
+  app.add_option("OUT", options.output, "folder to write")->required()->check(replay::not_empty());
+  app.add_option("--frames", options.frames, "number of frames along the whole path")->check(replay::whole_number(1, 999999));
   const std::map<std::string, replay::CameraPath> paths = {{"orbit", replay::CameraPath::kOrbit},
                                                            {"explore", replay::CameraPath::kExplore},
                                                            {"turn", replay::CameraPath::kTurn},
                                                            {"walk", replay::CameraPath::kWalk},
                                                            {"close", replay::CameraPath::kClose}};
+  std::string path = "orbit";
   app.add_option(
-         "--path", options.path,
+         "--path", path,
          "path of the camera: orbit (around the table), explore (around the table, looking everywhere), turn (on the spot), walk (into "
          "the corridor) or close (near the furniture)")
-      ->transform(CLI::CheckedTransformer(paths))
-      ->default_str("orbit");
-  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect")->check(CLI::Range(0.0, 1e5));
+      ->check(replay::one_of({"orbit", "explore", "turn", "walk", "close"}));
+  app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect")->check(replay::number(0, 1e5));
   app.add_flag("--noise", options.sensor.noise,
                "depth noise like that of a Kinect: standard deviation 1.425e-3 z^2 [m], whole steps of disparity");
   app.add_option("--dropouts", options.sensor.dropouts,
                  "share of pixels that are lost in blobs; above 0, most pixels at edges and at grazing angles are lost as well")
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(replay::number(0, 0.9));
   app.add_option("--seed", options.sensor.seed, "seed of noise and dropouts");
   std::string size = "640x480";
   app.add_option("--size", size, "width and height of the images [pixel]")->check([&](const std::string& text) {
@@ -133,6 +133,7 @@ int main(int argc, char** argv) {
   });
   return replay::run_command("make_synthetic", "make smaller images (--size).", [&] {
     replay::parse_arguments(app, argc, argv);
+    options.path = paths.at(path);
     write_sequence(options);
   });
 }

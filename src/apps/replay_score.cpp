@@ -18,6 +18,7 @@
 #include "replay/run.hpp"
 #include "replay/summary.hpp"
 #include "replay/sweep.hpp"
+#include "replay/warnings.hpp"
 #ifdef FRONTIER_SURFELS_WITH_ROS
 #include "ros/input/parameter_table.hpp"
 #endif
@@ -66,15 +67,20 @@ void print_parameters() {
 
 void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   SourceOptions& source = options.recording.options;
-  app.add_option("INPUT", options.recording.path, "a bag, or a folder (TUM RGB-D layout, or depth/ + poses.txt + camera.txt)")->required();
-  app.add_option("--report", options.report, "folder for the report; made if it is missing")->required()->type_name("DIR");
-  app.add_option("--config", raw.config_file, "YAML file with parameters of the mapper")->type_name("FILE.yaml");
+  app.add_option("INPUT", options.recording.path, "a bag, or a folder (TUM RGB-D layout, or depth/ + poses.txt + camera.txt)")
+      ->required()
+      ->check(not_empty());
+  app.add_option("--report", options.report, "folder for the report; made if it is missing")
+      ->required()
+      ->type_name("DIR")
+      ->check(not_empty());
+  app.add_option("--config", raw.config_file, "YAML file with parameters of the mapper")->type_name("FILE.yaml")->check(not_empty());
   app.add_option("--set", raw.settings, "set one parameter of the mapper; can be repeated")
       ->type_name("key=value")
       ->allow_extra_args(false);
-  app.add_option("--first", source.first, "index of the first frame")->type_name("N")->check(CLI::NonNegativeNumber);
-  app.add_option("--last", source.last, "index of the last frame; -1: the end")->type_name("N")->check(CLI::Range(-1, INT32_MAX));
-  app.add_option("--stride", source.stride, "use every N-th frame")->type_name("N")->check(CLI::PositiveNumber);
+  app.add_option("--first", source.first, "index of the first frame")->type_name("N")->check(whole_number(0));
+  app.add_option("--last", source.last, "index of the last frame; -1: the end")->type_name("N")->check(whole_number(-1));
+  app.add_option("--stride", source.stride, "use every N-th frame")->type_name("N")->check(whole_number(1));
   app.add_option("--depth-topic", source.depth_topic, "bags: topic of the depth images")->type_name("T");
   app.add_option("--info-topic", source.info_topic, "bags: topic of the depth camera's camera_info")->type_name("T");
   app.add_option("--color-topic", source.color_topic, "bags: topic of the colour images")->type_name("T");
@@ -86,10 +92,12 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
   app.add_flag("--no-exact", raw.no_exact, "leave out the exact test");
   app.add_option("--threads", raw.threads, "number of threads of the mapper and the scores; 0: all")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--sweep", raw.sweep, "repeat the run for N values of a parameter from LO to HI")->type_name("PARAM=LO:HI:N");
+      ->check(whole_number(0));
+  app.add_option("--sweep", raw.sweep, "repeat the run for N values of a parameter from LO to HI")
+      ->type_name("PARAM=LO:HI:N")
+      ->check(not_empty());
   app.add_flag("--live", raw.live, "bags: publish the recording to a running mapper node, and score the map that the node publishes");
-  app.add_option("--mapper", raw.mapper, "name of that node, default: mapper")->type_name("NAME")->needs("--live");
+  app.add_option("--mapper", raw.mapper, "name of that node, default: mapper")->type_name("NAME")->needs("--live")->check(not_empty());
   app.add_flag_callback(
       "--parameters",
       [] {
@@ -114,7 +122,7 @@ void read_config(const RawOptions& raw, Config& config) {
   }
   if (raw.threads) config.threads = *raw.threads;
   for (const std::string& problem : config.problems()) problems += problem + "\n";
-  if (!problems.empty()) throw CLI::ValidationError("", problems);
+  if (!problems.empty()) throw wrong_usage(problems);
 }
 
 /// @throws CLI::ValidationError
@@ -123,7 +131,7 @@ OctomapResolution octomap_resolution(const std::string& text) {
   double resolution = NAN;
   // The upper bound rejects values in millimetres, the lower one those that would fill any memory. NaN fails both comparisons.
   if (!from_text(text, resolution) || (resolution != 0 && !(resolution >= 1e-4 && resolution <= 10)))
-    throw CLI::ValidationError("--octomap-resolution", "must be auto, 0, or from 0.0001 to 10 m");
+    throw CLI::ValidationError("--octomap-resolution", "must be auto, 0, or from 0.0001 to 10 m, not '" + text + "'.");
   return resolution;
 }
 
@@ -132,7 +140,7 @@ LiveOptions live_options(const RawOptions& raw, const std::vector<std::string>& 
   if (!raw.config_file.empty() || !raw.settings.empty() || raw.threads || !raw.sweep.empty()) {
     throw CLI::ValidationError("--live",
                                "the running mapper has parameters of its own: set them where it is started, and leave out --config, --set, "
-                               "--threads and --sweep");
+                               "--threads and --sweep.");
   }
   LiveOptions live;
   if (!raw.mapper.empty()) live.mapper = raw.mapper;
@@ -158,7 +166,7 @@ Options parse(int argc, char** argv) {
     // With --report=~/x and in launch files no shell has expanded the `~`.
     for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
-    if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first");
+    if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first.");
     options.octomap_resolution = octomap_resolution(raw.octomap_resolution);
     read_config(raw, options.config);
     options.exact = !raw.no_exact;
@@ -166,7 +174,7 @@ Options parse(int argc, char** argv) {
     if (!raw.sweep.empty()) try {
         options.sweep = parse_sweep(raw.sweep, options.config);
       } catch (const Error& error) {
-        throw CLI::ValidationError("", error.what());
+        throw wrong_usage(error.what());
       }
   });
   return options;
@@ -193,6 +201,16 @@ void tell_skipped(const std::vector<std::string>& skipped) {
   if (skipped.size() > kShown) std::cerr << "... and " << skipped.size() - kShown << " more.\n";
 }
 
+/// Makes the page beside the other new files. They are kept if that fails.
+void make_page(ReportFolder& folder) {
+  try {
+    make_report_page(folder.unfinished(), folder.kept());
+  } catch (const Error&) {
+    folder.keep();
+    throw;
+  }
+}
+
 void replay_and_score(const Options& options) {
   catch_first_interrupt();
   auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
@@ -217,11 +235,11 @@ void replay_and_score(const Options& options) {
     const auto sweep = run_sweep(*options.sweep, options.recording, yardsticks, options.octomap_resolution, stop_requested);
     write_file(folder.unfinished() / "sweep.json", sweep.dump(2) + "\n");
   }
+  make_page(folder);
   folder.commit();
-  make_report_page(options.report);
   std::cout << "report      " << (fs::path(options.report) / "report.html").string() << "\n";
   if (!run.unsaved.empty()) throw FileError(run.unsaved);
-  if (is_empty) throw empty_map(options.recording, summary);
+  if (is_empty) throw empty_map(options.recording.path, warnings(run));
 }
 
 }  // namespace

@@ -17,23 +17,25 @@ int main(int argc, char** argv) {
 
   CLI::App app("Writes a recorded sequence as a bag, with the topics and tf frames of the TUM RGB-D benchmark's bags.", "sequence_to_bag");
   app.option_defaults()->always_capture_default();
-  app.add_option("FOLDER", folder, "folder of the recording: depth/ + poses.txt + camera.txt, or TUM RGB-D layout")->required();
-  app.add_option("OUT.bag", output, "bag to write")->required();
-  app.add_option("--encoding", options.encoding, "encoding of the depth images")->check(CLI::IsMember({"32FC1", "16UC1"}));
+  app.add_option("FOLDER", folder, "folder of the recording: depth/ + poses.txt + camera.txt, or TUM RGB-D layout")
+      ->required()
+      ->check(replay::not_empty());
+  app.add_option("OUT.bag", output, "bag to write")->required()->check(replay::not_empty());
+  app.add_option("--encoding", options.encoding, "encoding of the depth images")->check(replay::one_of({"32FC1", "16UC1"}));
   app.add_option("--depth-unit", options.depth_unit, "one step of the folder's 16-bit depth images [m]; TUM RGB-D layout has its own")
-      ->check(CLI::PositiveNumber);
+      ->check(replay::positive_number());
   app.add_flag("--compressed", options.compressed,
                "write compressedDepth and JPEG images instead of raw ones; depth as 32FC1 is then quantised");
-  app.add_option("--compression", options.compression, "compression of the bag")->check(CLI::IsMember({"none", "lz4", "bz2"}));
+  app.add_option("--compression", options.compression, "compression of the bag")->check(replay::one_of({"none", "lz4", "bz2"}));
   app.add_flag("--no-slashes", no_slashes, "write the names of tf frames without leading slashes");
   app.add_flag("--static-tf", options.static_transforms, "write constant transforms to /tf_static (latched) instead of to /tf");
-  app.add_option("--depth-topic", options.depth_topic, "topic of the depth images");
-  app.add_option("--info-topic", options.depth_info_topic, "topic of the depth camera's camera_info");
-  app.add_option("--color-topic", options.color_topic, "topic of the colour images");
-  app.add_option("--color-info-topic", options.color_info_topic, "topic of the colour camera's camera_info");
-  app.add_option("--first", source_options.first, "index of the first frame");
+  app.add_option("--depth-topic", options.depth_topic, "topic of the depth images")->check(replay::not_empty());
+  app.add_option("--info-topic", options.depth_info_topic, "topic of the depth camera's camera_info")->check(replay::not_empty());
+  app.add_option("--color-topic", options.color_topic, "topic of the colour images")->check(replay::not_empty());
+  app.add_option("--color-info-topic", options.color_info_topic, "topic of the colour camera's camera_info")->check(replay::not_empty());
+  app.add_option("--first", source_options.first, "index of the first frame")->check(replay::whole_number(0));
   app.add_option("--last", source_options.last, "index of the last frame; -1: the end");
-  app.add_option("--stride", source_options.stride, "use every N-th frame");
+  app.add_option("--stride", source_options.stride, "use every N-th frame")->check(replay::whole_number(1));
   return replay::run_command("sequence_to_bag", "the images are too large for this machine.", [&] {
     replay::parse_arguments(app, argc, argv);
     options.leading_slashes = !no_slashes;

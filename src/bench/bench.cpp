@@ -2,10 +2,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <set>
 #include <thread>
 
 #include "apps/command.hpp"
 #include "apps/interrupt.hpp"
+#include "bench/measured_run.hpp"
 #include "bench/sections.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/paths.hpp"
@@ -38,28 +40,30 @@ void declare_options(CLI::App& app, Options& options) {
     footer += "  " + names.back() + std::string(10 - names.back().size(), ' ') + section.what + "\n";
   }
   app.footer(footer);
-  app.add_option("INPUT", options.inputs, "bags or folders, as replay_score takes them; none: a synthetic room");
+  app.add_option("INPUT", options.inputs, "bags or folders, as replay_score takes them; none: a synthetic room")
+      ->check(replay::not_empty());
   app.add_option("--frames", options.frames, "use the first N frames of each input, default 100; 0: all")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+      ->check(replay::whole_number(0));
   app.add_option("--only", options.sections, "measure only these sections, which are listed below")
       ->type_name("SECTION...")
-      ->check(CLI::IsMember(names));
+      ->check(replay::one_of(names));
   app.add_option("--octomap-frames", options.octomap_frames, "number of frames for OctoMap, evenly spaced, default 20; 0: all")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+      ->check(replay::whole_number(0));
   app.add_option("--long-frames", options.long_frames, "number of frames of the section long, default 10000")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(replay::whole_number(1));
   app.add_option("--row-seconds", options.row_seconds, "end a row of a table after S seconds, default 120")
       ->type_name("S")
-      ->check(CLI::PositiveNumber);
+      ->check(replay::positive_number());
   app.add_option("--config", options.config_file,
                  "YAML file with parameters of the mapper; bench itself sets decimation, and z_max and threads where it varies them")
-      ->type_name("FILE.yaml");
-  app.add_option("--json", options.json, "write all numbers to this file")->type_name("FILE");
+      ->type_name("FILE.yaml")
+      ->check(replay::not_empty());
+  app.add_option("--json", options.json, "write all numbers to this file")->type_name("FILE")->check(replay::not_empty());
   app.add_flag("--quick", options.quick, "only check that everything runs, with a few small frames; the numbers mean nothing");
-  app.add_option("--child", options.child)->check(CLI::IsMember({"start", "memory"}))->group("");  // see child_process.hpp
+  app.add_option("--child", options.child)->check(replay::one_of({"start", "memory"}))->group("");  // see child_process.hpp
 }
 
 /// @throws CLI::Error (also for help, with exit code 0), Error
@@ -74,7 +78,7 @@ Options parse(int argc, char** argv) {
     if (!options.config_file.empty()) options.config = load_config(options.config_file);
     std::string problems;
     for (const std::string& problem : options.config.problems()) problems += problem + "\n";
-    if (!problems.empty()) throw CLI::ValidationError("", problems);
+    if (!problems.empty()) throw replay::wrong_usage(problems);
   });
   constexpr int kQuickFrames = 4;
   if (options.quick && (options.frames == 0 || options.frames > kQuickFrames)) options.frames = kQuickFrames;
@@ -83,6 +87,21 @@ Options parse(int argc, char** argv) {
 
 bool wanted(const Options& options, const Section& section) {
   return options.sections.empty() || std::find(options.sections.begin(), options.sections.end(), section.name) != options.sections.end();
+}
+
+/// Prints what is wrong with the inputs, each sentence once. @throws EmptyMap if a map is empty
+void tell_faults(const ordered_json& sections) {
+  std::set<std::string> told;
+  std::string empty;
+  for (const auto& rows : sections) {
+    for (const auto& row : rows) {
+      if (row.contains("empty_map") && empty.empty()) empty = row["error"];
+      for (const std::string sentence : row.value("warnings", ordered_json::array()))
+        if (told.insert(row["input"].get<std::string>() + sentence).second)
+          std::cout << "WARNING     " << row["input"].get<std::string>() << ": " << sentence << "\n";
+    }
+  }
+  if (!empty.empty()) throw EmptyMap(empty);
 }
 
 void measure(const Options& options) {
@@ -108,6 +127,7 @@ void measure(const Options& options) {
   }
   json["complete"] = !replay::stop_requested();
   write();
+  tell_faults(json["sections"]);
   if (replay::stop_requested())
     std::cerr << "Stopped. What was measured so far is printed above, and is in the JSON file if --json was given.\n";
 }

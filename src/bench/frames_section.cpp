@@ -35,7 +35,7 @@ ordered_json measure_row(const Options& options, const Input& input, const Confi
   attempt(row, [&] {
     const auto source = input.open();
     Mapper mapper(config);
-    add_figures(run_frames(mapper, *source, options), row);
+    add_figures(run_frames(mapper, input, *source, options), row);
   });
   return row;
 }

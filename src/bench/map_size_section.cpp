@@ -64,7 +64,7 @@ std::vector<Surfel> tiled(const std::vector<Surfel>& room, double wanted, double
 std::vector<Surfel> map_room(const Options& options, const Input& input, const Config& config) {
   const auto source = input.open();
   Mapper mapper(config);
-  run_frames(mapper, *source, options);
+  run_frames(mapper, input, *source, options);
   return mapper.surfels();
 }
 
@@ -76,7 +76,7 @@ ordered_json measure_row(const Options& options, const Input& input, const std::
     Mapper mapper(config);
     mapper.load(tiled(room, millions * kMillion, config.z_max));  // a temporary, freed before frames are measured
     row["loaded"] = mapper.size();
-    const auto run = run_frames(mapper, *source, options);
+    const auto run = run_frames(mapper, input, *source, options);
     add_figures(run, row);
     row["bytes_a_surfel"] = double(row["map_bytes"]) / double(row["surfels"]);
     for (const auto& frame : replay::warm_frames(run.frames)) {
@@ -119,10 +119,17 @@ ordered_json measure_map_size(const Options& options, const std::vector<Input>& 
   const auto sizes = options.quick ? std::vector<double>{0.01, 0.5} : std::vector<double>{1, 5, 20, 50};
   for (const Input& input : inputs) {
     if (replay::stop_requested()) break;
-    const std::vector<Surfel> room = map_room(options, input, input.config(kUsualWidth));
+    std::vector<Surfel> room;
+    ordered_json fault = {{"input", input.name()}, {"millions", sizes.front()}};
+    attempt(fault, [&] { room = map_room(options, input, input.config(kUsualWidth)); });
     const Table table(
         "The same frames in maps of several sizes, ms a frame",
         {"input", "million", "surfels", "frames", "median", "p95", "CPU", "ratio", "CPU ratio", "bytes a surfel", "working MB"});
+    if (fault.contains("error")) {
+      print_row(table, fault);
+      rows.push_back(std::move(fault));
+      continue;
+    }
     Times smallest;
     for (const double millions : sizes) {
       if (replay::stop_requested()) break;

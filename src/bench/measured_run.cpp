@@ -5,18 +5,22 @@
 
 #include "apps/interrupt.hpp"
 #include "replay/summary.hpp"
+#include "replay/warnings.hpp"
 
 namespace frontier_surfels::bench {
 
 using nlohmann::ordered_json;
 
-replay::Run run_frames(Mapper& mapper, replay::FrameSource& source, const Options& options, const AfterFrame& after_frame) {
+replay::Run run_frames(Mapper& mapper, const Input& input, replay::FrameSource& source, const Options& options,
+                       const AfterFrame& after_frame) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration<double>(options.row_seconds);
   const auto stop = [&] { return replay::stop_requested() || Clock::now() > end; };
   const auto nothing = [](const DepthFrame&, replay::FrameRecord&) {};
   replay::Run run = replay::map_frames(mapper, source, after_frame ? after_frame : nothing, stop);
+  if (!run.unsaved.empty()) throw FileError(run.unsaved);
   if (run.frames.empty()) throw Error("No frame could be used" + (run.skipped.empty() ? "." : ": " + run.skipped.front()));
+  if (run.frames.back().report.surfels == 0) throw EmptyMap(replay::empty_map(input.path(), replay::warnings(run)).what());
   return run;
 }
 
@@ -44,11 +48,15 @@ void add_figures(const replay::Run& run, ordered_json& row) {
   row["surfels"] = last.surfels;
   row["map_bytes"] = last.map_bytes;
   row["working_bytes"] = working_bytes;
+  if (const auto warnings = replay::warnings(run); !warnings.empty()) row["warnings"] = warnings;
 }
 
 void attempt(ordered_json& row, const std::function<void()>& measure) {
   try {
     measure();
+  } catch (const EmptyMap& empty) {
+    row["error"] = empty.what();
+    row["empty_map"] = true;
   } catch (const std::bad_alloc&) {
     row["error"] = "Out of memory.";
   } catch (const std::exception& error) {

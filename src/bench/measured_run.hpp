@@ -4,6 +4,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "bench/input.hpp"
 #include "bench/options.hpp"
 #include "replay/run.hpp"
 
@@ -14,17 +15,26 @@ constexpr int kUsualWidth = 160;
 
 using AfterFrame = std::function<void(const DepthFrame&, replay::FrameRecord&)>;
 
-/// Maps frames until there are no more, options.row_seconds have passed, or Ctrl-C is pressed.
-/// @throws Error  if no frame could be used
-replay::Run run_frames(Mapper& mapper, replay::FrameSource& source, const Options& options, const AfterFrame& after_frame = {});
+/// The map of an input is empty, so that its figures mean nothing. The message is that of replay_score.
+struct EmptyMap : Error {
+  using Error::Error;
+};
 
-/// Adds the number of frames, the times without the first frames, the number of surfels and the memory to `row`.
+/// Maps frames until there are no more, options.row_seconds have passed, or Ctrl-C is pressed.
+/// @param source  frames of `input`
+/// @throws Error  if no frame could be used. @throws EmptyMap
+replay::Run run_frames(Mapper& mapper, const Input& input, replay::FrameSource& source, const Options& options,
+                       const AfterFrame& after_frame = {});
+
+/// Adds the number of frames, the times without the first frames, the number of surfels, the memory, and warnings about the
+/// recording if there are any, to `row`.
 void add_figures(const replay::Run& run, nlohmann::ordered_json& row);
 
 /// @param values  not empty
 nlohmann::ordered_json statistics_json(const std::vector<double>& values);
 
 /// Runs `measure`. If it throws, as when the device is too small, the message goes to row["error"], and other rows can still be measured.
+/// row["empty_map"] is set after an EmptyMap.
 void attempt(nlohmann::ordered_json& row, const std::function<void()>& measure);
 
 }  // namespace frontier_surfels::bench

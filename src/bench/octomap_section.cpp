@@ -29,7 +29,7 @@ ordered_json measure_row(const Options& options, const Input& input) {
     const auto source = input.open(options.octomap_frames);
     Mapper mapper(config);
     scoring::OctomapTruth octomap(resolution, config);
-    const auto run = run_frames(mapper, *source, options,
+    const auto run = run_frames(mapper, input, *source, options,
                                 [&](const DepthFrame& frame, replay::FrameRecord& record) { record.octomap = octomap.add(frame); });
     add_figures(run, row);
     const auto warm = replay::warm_frames(run.frames);

@@ -91,13 +91,15 @@ ordered_json measure_start(const Options& options, const std::vector<Input>& inp
 
 ordered_json child_memory(const Options& options, const Input& input) {
   ordered_json row = {{"input", input.name()}};
-  const auto source = input.open();
-  row["rss_before_mb"] = replay::peak_rss_mb();
-  Mapper mapper(input.config(kUsualWidth));
-  row["rss_constructed_mb"] = replay::peak_rss_mb();
-  add_figures(run_frames(mapper, *source, options), row);
-  row["rss_peak_mb"] = replay::peak_rss_mb();
-  row["bytes_a_surfel"] = double(row["map_bytes"]) / double(row["surfels"]);
+  attempt(row, [&] {
+    const auto source = input.open();
+    row["rss_before_mb"] = replay::peak_rss_mb();
+    Mapper mapper(input.config(kUsualWidth));
+    row["rss_constructed_mb"] = replay::peak_rss_mb();
+    add_figures(run_frames(mapper, input, *source, options), row);
+    row["rss_peak_mb"] = replay::peak_rss_mb();
+    row["bytes_a_surfel"] = double(row["map_bytes"]) / double(row["surfels"]);
+  });
   return row;
 }
 

@@ -57,7 +57,7 @@ ordered_json measure_row(const Options& options, const Input& input, const Confi
   attempt(row, [&] {
     Mapper mapper(config);
     const auto source = input.open();
-    const auto run = run_frames(mapper, *source, options);
+    const auto run = run_frames(mapper, input, *source, options);
     for (const std::string& name : replay::stage_names(run.frames)) row["stages"][name] = 0;  // puts them in order
     const auto frame = input.open(1)->next();
     if (!frame) throw Error("The first frame could not be read again.");

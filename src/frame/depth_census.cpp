@@ -12,6 +12,8 @@ namespace {
 
 constexpr float kImplausible = 100;  // [m]; no depth camera measures as far, so that such a depth is in another unit
 
+constexpr double kFewInRange = 0.05;  // share of the measured depths
+
 std::string number(double value) { return rounded_text(value, 3); }
 
 void count_depth(float depth, const Config& config, DepthCensus& census) {
@@ -21,11 +23,15 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
   }
   census.nearest = std::min(census.nearest, depth);
   if (std::isfinite(depth)) census.farthest = std::max(census.farthest, depth);
+  if (std::isinf(depth)) ++census.infinite;
   const bool carves = std::isinf(depth) ? config.carve_no_return : config.carve_beyond_range && depth < kImplausible;
   if (depth < static_cast<float>(config.z_min)) {
     ++census.too_near;
-  } else if (depth <= static_cast<float>(config.z_max) || carves) {
+  } else if (depth <= static_cast<float>(config.z_max)) {
     ++census.usable;
+  } else if (carves) {
+    ++census.usable;
+    ++census.carved;
   } else {
     ++census.too_far;
   }
@@ -55,10 +61,12 @@ std::string DepthCensus::reason() const {
 
 DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   usable += other.usable;
+  carved += other.carved;
   missing += other.missing;
   saturated += other.saturated;
   too_near += other.too_near;
   too_far += other.too_far;
+  infinite += other.infinite;
   in_metres = other.in_metres;
   nearest = std::min(nearest, other.nearest);
   farthest = std::max(farthest, other.farthest);
@@ -79,6 +87,16 @@ std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
     text += "32-bit images must be in metres, so correct their unit";
   }
   return text + ", or change z_min and z_max.";
+}
+
+std::string few_in_range(const DepthCensus& depths, const Config& config) {
+  const std::size_t measured = depths.measured() - depths.infinite, in_range = depths.usable - depths.carved;
+  if (depths.usable == 0 || measured == 0) return {};
+  const double share = static_cast<double>(in_range) / static_cast<double>(measured);
+  if (share >= kFewInRange) return {};
+  const std::string carves = config.carve_beyond_range ? ", and carve_beyond_range takes those beyond for free space" : "";
+  return (in_range == 0 ? "None" : "Only " + number(100 * share) + " %") + " of the measured depths are from " + depth_range(config) +
+         carves + (in_range == 0 ? ". All are " : ". All others are ") + range_and_remedy(depths, config);
 }
 
 DepthCensus count_depths(const DepthImage& image, const Config& config) {

@@ -75,7 +75,8 @@ void replace_file(const std::string& path, const std::string& header, const void
   // A link is followed, and a device (/dev/null) is not replaced by a file.
   const fs::path target = fs::exists(path, none) ? fs::canonical(path, none) : fs::path(path);
   if (fs::exists(target, none) && !fs::is_regular_file(target, none))
-    throw FileError("The map cannot be written to " + path + ": it is no ordinary file; give another name.");
+    throw FileError("The map cannot be written to " + path + ": it is " +
+                    (fs::is_directory(target, none) ? "a folder; give the name of a file." : "no ordinary file; give another name."));
   Replacement file(target.string());
   file.write(header.data(), header.size());
   file.write(body, body_bytes);

@@ -280,7 +280,7 @@ std::vector<Surfel> SurfelMap::download() const {
   return surfels;
 }
 
-Changes SurfelMap::changes(std::uint64_t since, bool given_again) const {
+Changes SurfelMap::changes(std::uint64_t since) const {
   const auto blocks = page_block_.read(index_.end());
   std::vector<Page> pages;
   for (Page page = 0; page < blocks.size(); ++page)
@@ -288,7 +288,7 @@ Changes SurfelMap::changes(std::uint64_t since, bool given_again) const {
   Changes changes;
   visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
     for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
-    for_each_bit(given_again ? ~cl_ulong{0} : ~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
   });
   return changes;
 }

@@ -78,8 +78,7 @@ class SurfelMap {
   std::vector<Surfel> download() const;
 
   /// Content of the pages that changed after frame `since`: all their surfels as updated, all their empty slots as removed.
-  /// @param given_again  ids may have been given again after `since`: all slots of these pages are told as removed
-  Changes changes(std::uint64_t since, bool given_again = false) const;
+  Changes changes(std::uint64_t since) const;
 
   /// From now on, no id is given again that a surfel has lost after frame `told`. To be called between frames. Without a number, ids are
   /// given again at once, as at first.

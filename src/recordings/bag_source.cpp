@@ -123,6 +123,9 @@ void BagSource::choose_world(const std::string& wanted) {
   if (!first) throw Error(bag_.getFileName() + " has no images on " + topics_.depth + ".");
   const std::string camera = strip_slash(first.header().frame_id);
   world_ = strip_slash(wanted);
+  if (world_.empty() && camera.empty())
+    throw Error("The frame_id of the first image on " + topics_.depth +
+                " is empty: its driver must set it to the camera's optical frame; choose another topic with --depth-topic.");
   if (world_.empty()) world_ = transforms_.root_of(camera);
   if (world_ == camera)
     throw Error("The world frame '" + world_ +
@@ -155,21 +158,26 @@ RecordedFrame BagSource::read(const rosbag::MessageInstance& message) {
   if (!image) throw BadFrame("it is a " + message.getDataType());
   const std_msgs::Header& header = image.header();
 
+  const std::string camera = strip_slash(header.frame_id);
+  if (camera.empty()) throw BadFrame("its frame_id is empty: its driver must set it to the camera's optical frame");
+
   RecordedFrame frame;
   frame.stamp = header.stamp.toSec();
-  frame.T_world_camera = transforms_.T_world_frame(world_, strip_slash(header.frame_id), header.stamp);
+  frame.T_world_camera = transforms_.T_world_frame(world_, camera, header.stamp);
   frame.depth = messages::copy(messages::depth_pixels(image).view);
-  frame.intrinsics = intrinsics_at(header.stamp, frame.depth.size());
+  const sensor_msgs::CameraInfo& info = camera_at(header.stamp);
+  frame.intrinsics = messages::to_intrinsics(info, frame.depth.size());
   if (color_images_) frame.color = color_at(header.stamp, frame.depth.size());
+  for (std::string& remark : remarks_.on(frame.view().depth, info)) warnings_.push_back(std::move(remark));
   return frame;
 }
 
-/// The intrinsics of the latest camera_info at or before the stamp, or of the first one if there is none.
-Intrinsics BagSource::intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const {
+/// The latest camera_info at or before the stamp, or of the first one if there is none.
+const sensor_msgs::CameraInfo& BagSource::camera_at(const ros::Time& stamp) const {
   auto camera = std::upper_bound(cameras_.begin(), cameras_.end(), stamp,
                                  [](const ros::Time& value, const auto& element) { return value < element.first; });
   if (camera != cameras_.begin()) --camera;
-  return messages::to_intrinsics(camera->second, image_size);
+  return camera->second;
 }
 
 /// The colour image of a frame, or an empty one. A fault of a colour image never drops a frame.

@@ -15,6 +15,7 @@
 #include "recordings/frame_source.hpp"
 #include "recordings/selection.hpp"
 #include "ros/input/conversions.hpp"
+#include "ros/input/frame_remarks.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -41,6 +42,7 @@ class BagSource : public FrameSource {
   std::optional<RecordedFrame> next() override;
   const std::vector<std::string>& skipped() const override { return skipped_; }
   const std::vector<std::string>& notes() const override { return notes_; }
+  std::vector<std::string> warnings() const override { return warnings_; }
   std::string world_frame() const override { return world_; }
   std::string if_still() const override;
 
@@ -56,7 +58,7 @@ class BagSource : public FrameSource {
   void read_transforms_or_camera(const rosbag::MessageInstance& message);
   void choose_world(const std::string& wanted);
   RecordedFrame read(const rosbag::MessageInstance& message);
-  Intrinsics intrinsics_at(const ros::Time& stamp, const cv::Size& image_size) const;
+  const sensor_msgs::CameraInfo& camera_at(const ros::Time& stamp) const;
   cv::Mat color_at(const ros::Time& stamp, const cv::Size& depth_size);
   void note_once(const std::string& sentence);
 
@@ -72,7 +74,8 @@ class BagSource : public FrameSource {
   Selection selection_;
   std::size_t done_ = 0;  ///< frames of the selection that are read
   std::vector<std::string> skipped_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, warnings_;
+  CameraRemarks remarks_{"choose with --depth-topic", "Choose the topics of one camera with --depth-topic and --info-topic."};
 };
 
 }  // namespace frontier_surfels::replay

@@ -4,8 +4,6 @@
 #include <rosbag/bag.h>
 #include <rosbag/message_instance.h>
 
-#include <cstdint>
-#include <limits>
 #include <string>
 
 #include "recordings/frame_source.hpp"
@@ -14,6 +12,7 @@
 namespace frontier_surfels::replay {
 
 using messages::ImageMessage;
+using messages::is_believed;
 
 /// Names of topics, as they are written in the bag.
 struct BagTopics {
@@ -25,11 +24,6 @@ struct BagTopics {
 /// Uses the topics named in `options`, and finds the others by their names, types and first messages.
 /// @throws Error if a topic is missing, or there are several candidates; it lists them
 BagTopics find_topics(const rosbag::Bag& bag, const SourceOptions& options);
-
-/// Latest time that is believed [s]; in the year 2038. Some drivers write the largest time, 2^32 s, for "no time".
-constexpr std::int32_t kLatestTime = std::numeric_limits<std::int32_t>::max();
-
-inline bool is_believed(const ros::Time& stamp) { return stamp <= ros::Time(kLatestTime, 0); }
 
 /// The image of a message of a bag; empty if the message has another type.
 ImageMessage to_image_message(const rosbag::MessageInstance& message);

@@ -37,7 +37,7 @@ void normalise(geometry_msgs::Quaternion& q) {
 }
 
 /// Transforms are kept as long as possible: tf2 adds this duration to stamps, and ros::Time can just hold the sum.
-BagTransforms::BagTransforms() : buffer_(ros::Duration(kLatestTime, 0)) {}
+BagTransforms::BagTransforms() : buffer_(ros::Duration(messages::kLatestTime, 0)) {}
 
 void BagTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
   for (geometry_msgs::TransformStamped transform : message.transforms) {
@@ -83,7 +83,7 @@ std::string BagTransforms::frames() const {
 
 Eigen::Isometry3d BagTransforms::T_world_frame(const std::string& world, const std::string& frame, const ros::Time& stamp) const {
   if (stamp.isZero()) throw BadFrame("its stamp is 0, which is not a valid time");
-  if (!is_believed(stamp)) throw BadFrame("its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038");
+  if (!is_believed(stamp)) throw BadFrame(messages::late_stamp(stamp));
   if (frame == world) throw BadFrame("its frame is the world frame '" + world + "' itself");
   try {
     return messages::to_isometry(buffer_.lookupTransform(world, frame, stamp).transform);

@@ -32,6 +32,8 @@ class FrameSource {
   virtual const std::vector<std::string>& skipped() const = 0;
   /// Sentences about what was chosen or assumed because the recording does not say it, and about colour images that cannot be used.
   virtual const std::vector<std::string>& notes() const = 0;
+  /// Sentences about faults of the recording from which a wrong map may come.
+  virtual std::vector<std::string> warnings() const { return {}; }
   /// Name of the frame of the poses; empty if it has none.
   virtual std::string world_frame() const { return {}; }
   /// What to check if the camera should move but does not, as the end of a sentence.

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "frontier_surfels/types.hpp"
 
@@ -10,13 +11,17 @@ namespace frontier_surfels::replay {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr const char* kPage = "report.html";
 constexpr const char* kFiles[] = {"summary.json", "frames.csv",   "trajectory.txt", "surfels.ply",
-                                  "octomap.ply",  "verdicts.bin", "sweep.json",     "report.html"};
+                                  "octomap.ply",  "verdicts.bin", "sweep.json",     kPage};
 
-/// Removes the files of a report, and nothing else.
+/// Removes the files of a report, also those that a killed program was writing, and nothing else.
 void remove_files(const fs::path& folder) {
   std::error_code ignored;
-  for (const char* name : kFiles) fs::remove(folder / name, ignored);
+  for (const std::string name : kFiles) {
+    fs::remove(folder / name, ignored);
+    fs::remove(folder / (name + ".unfinished"), ignored);
+  }
 }
 
 bool can_be_written(const fs::path& folder) {
@@ -41,25 +46,41 @@ ReportFolder::ReportFolder(const fs::path& folder) : folder_(folder), unfinished
 }
 
 ReportFolder::~ReportFolder() {
+  if (is_kept_) return;
   std::error_code ignored;
   remove_files(unfinished_);
   fs::remove(unfinished_, ignored);
   if (is_new_) fs::remove(folder_, ignored);  // does nothing if there are files in it
 }
 
+/// Nothing of the earlier report is removed before all new files are in their places.
 void ReportFolder::commit() {
-  std::error_code error, absent;
+  const auto check = [this](const std::error_code& error, const char* name) {
+    if (!error) return;
+    throw FileError("'" + (folder_ / name).string() + "' cannot be replaced (" + error.message() +
+                    "): check that the folder and its files are yours.");
+  };
+  std::error_code error;
+  std::vector<const char*> absent;
   for (const char* name : kFiles) {
     if (fs::exists(unfinished_ / name)) {
       fs::rename(unfinished_ / name, folder_ / name, error);
+      check(error, name);
     } else {
-      fs::remove(folder_ / name, absent);
-    }
-    if (error) {
-      throw FileError("'" + (folder_ / name).string() + "' cannot be replaced (" + error.message() +
-                      "): check that the folder and its files are yours.");
+      absent.push_back(name);
     }
   }
+  for (const char* name : absent) fs::remove(folder_ / name, error);
+}
+
+const fs::path& ReportFolder::kept() const {
+  std::error_code ignored;
+  return fs::exists(folder_ / kPage, ignored) ? unfinished_ : folder_;
+}
+
+void ReportFolder::keep() {
+  if (kept() == folder_) return commit();
+  is_kept_ = true;
 }
 
 }  // namespace frontier_surfels::replay

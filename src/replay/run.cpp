@@ -53,6 +53,7 @@ Run new_run(const FrameSource& source, const Config& config, const std::string& 
 void finish_run(const FrameSource& source, Run& run) {
   run.skipped.insert(run.skipped.end(), source.skipped().begin(), source.skipped().end());
   run.notes = source.notes();
+  run.remarks = source.warnings();
 }
 
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,
@@ -70,6 +71,10 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {
       run.skipped.push_back(refused.what());
+    } catch (const FileError& fault) {  // what has been mapped before is worth having all the same
+      run.unsaved =
+          "The map ends after " + std::to_string(run.frames.size()) + " frames, and the map folder may lack a part of it. " + fault.what();
+      break;
     }
     progress.update(static_cast<double>(run.frames.size() + run.skipped.size() + source.skipped().size()));
     if (stop()) {
@@ -92,6 +97,7 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
     if (yardsticks != nullptr) record.octomap = yardsticks->add(view);
   };
   Run run = map_frames(mapper, *source, measure, stop);
+  if (run.frames.empty() && !run.unsaved.empty()) throw FileError(run.unsaved);
   if (run.frames.empty()) throw nothing_usable(recording, run.skipped);
 
   run.surfels = mapper.whole_map();
@@ -104,7 +110,7 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
   try {
     mapper.flush();
   } catch (const FileError& fault) {  // the scores are worth having all the same
-    run.unsaved = std::string("The map folder lacks a part of the map. ") + fault.what();
+    if (run.unsaved.empty()) run.unsaved = std::string("The map folder lacks a part of the map. ") + fault.what();
   }
   return run;
 }

@@ -74,20 +74,22 @@ struct Run {
   std::vector<FrameRecord> frames;
   std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
   std::vector<std::string> notes;    ///< see FrameSource
+  std::vector<std::string> remarks;  ///< the warnings of a FrameSource
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame
   bool stopped = false;    ///< before the end of the recording
-  std::string unsaved;     ///< why the map folder lacks a part of the map; empty: it has all, or there is none
+  std::string unsaved;     ///< why the map folder lacks a part of the map, and whether the run has ended there; empty: it lacks none
 };
 
 /// A run that has not begun: its date is now, and it knows where the poses come from.
 Run new_run(const FrameSource& source, const Config& config, const std::string& device);
 
-/// Adds the notes of the source, and its skipped frames to those of the mapper.
+/// Adds the notes and warnings of the source, and its skipped frames to those of the mapper.
 void finish_run(const FrameSource& source, Run& run);
 
-/// Maps the remaining frames of `source`. Does not set the surfels, the statistics and the peak memory of the result.
+/// Maps the remaining frames of `source`, up to one that is refused because the map folder cannot be read or written. Does not set the
+/// surfels, the statistics and the peak memory of the result.
 /// @param after_frame  called with every frame that the mapper took, and its record
 /// @param stop         asked after every frame whether to leave the rest
 Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(const DepthFrame&, FrameRecord&)>& after_frame,

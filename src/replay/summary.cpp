@@ -168,11 +168,11 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
   return json;
 }
 
-Error empty_map(const Recording& recording, const ordered_json& summary) {
+Error empty_map(const std::string& path, const std::vector<std::string>& warnings) {
   std::string why;
-  for (const auto& warning : summary["warnings"]) why += " " + warning.get<std::string>();
+  for (const std::string& warning : warnings) why += " " + warning;
   if (why.empty()) why = " No frame has seen a surface or free space: check the depth images, and z_min and z_max.";
-  return Error("The map of '" + recording.path + "' is empty." + why);
+  return Error("The map of '" + path + "' is empty." + why);
 }
 
 std::string frames_csv(const std::vector<FrameRecord>& frames) {

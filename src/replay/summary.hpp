@@ -45,8 +45,8 @@ std::string frames_csv(const std::vector<FrameRecord>& frames);
 /// The poses in the format of TUM RGB-D, a line for each frame: stamp tx ty tz qx qy qz qw, camera to world.
 std::string trajectory_text(const std::vector<FrameRecord>& frames);
 
-/// The error for a recording whose frames were mapped, but left the map empty. @param summary  its summary.json
-Error empty_map(const Recording& recording, const nlohmann::ordered_json& summary);
+/// The error for a recording whose frames were mapped, but left the map empty. @param warnings  about the run
+Error empty_map(const std::string& path, const std::vector<std::string>& warnings);
 
 /// The main figures of a summary.json, for a terminal.
 std::string result_table(const nlohmann::ordered_json& summary);

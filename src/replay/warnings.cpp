@@ -2,12 +2,9 @@
 
 #include <algorithm>
 
-#include "frontier_surfels/number_text.hpp"
-
 namespace frontier_surfels::replay {
 namespace {
 
-constexpr double kFewUsable = 0.05;      // share of the measured depths
 constexpr double kStillDistance = 1e-4;  // [m], below the noise of any tracked pose
 constexpr double kStillRotation = 1e-4;  // largest difference of a rotation matrix' elements
 
@@ -38,15 +35,13 @@ void warn_of_depths(const Run& run, std::vector<std::string>& warnings) {
   }
 }
 
-/// Warns of a wrong unit with which some depths happen to be in range.
+/// Warns of a wrong unit with which some depths happen to be usable.
 void warn_of_few_depths(const Run& run, std::vector<std::string>& warnings) {
   DepthCensus all;
-  for (const FrameRecord& frame : run.frames) all += frame.depths;
-  if (all.measured() == 0 || all.usable == 0) return;
-  const double share = static_cast<double>(all.usable) / static_cast<double>(all.measured());
-  if (share >= kFewUsable) return;
-  warnings.push_back("Only " + rounded_text(100 * share, 3) + " % of the measured depths are from " + depth_range(run.config) +
-                     ", all others " + range_and_remedy(all, run.config));
+  for (const FrameRecord& frame : run.frames)
+    if (frame.depths.usable > 0) all += frame.depths;
+  const std::string few = few_in_range(all, run.config);
+  if (!few.empty()) warnings.push_back(few);
 }
 
 }  // namespace
@@ -64,7 +59,8 @@ bool is_still(const std::vector<FrameRecord>& frames) {
 std::vector<std::string> warnings(const Run& run) {
   std::vector<std::string> all;
   warn_of_depths(run, all);
-  if (all.empty()) warn_of_few_depths(run, all);
+  warn_of_few_depths(run, all);
+  all.insert(all.end(), run.remarks.begin(), run.remarks.end());
   if (is_still(run.frames))
     all.push_back("The camera never moves: all " + std::to_string(run.frames.size()) + " frames have the same pose in the frame '" +
                   run.world_frame + "'" + (run.if_still.empty() ? "" : "; if it did move, " + run.if_still) + ".");

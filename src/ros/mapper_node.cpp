@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "ros/arguments.hpp"
 #include "ros/input/parameter_table.hpp"
 #include "ros/mapper_ros.hpp"
 
@@ -46,6 +48,13 @@ int main(int argc, char** argv) {
   if (std::any_of(argv + 1, argv + argc, is_help)) {
     std::cout << kHelp << parameter_table() << node_parameter_table();
     return 0;
+  }
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  arguments.erase(arguments.begin());
+  if (const std::string fault = fault_of_arguments(arguments); !fault.empty()) {
+    std::cerr << fault << std::endl;
+    return 2;
   }
   ros::init(argc, argv, "mapper");
   const ros::NodeHandle nh, pnh("~");  // must outlive the mapper: without a node handle the error below would not be logged

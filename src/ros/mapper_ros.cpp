@@ -25,6 +25,7 @@
 #include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
+#include "ros/input/warning_throttle.hpp"
 #include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
@@ -92,9 +93,10 @@ class MapperRos::Impl {
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
-  Mapper mapper_;                         // only used by the mapping thread
-  MapFolderWatch folder_watch_{mapper_};  // only used by the mapping thread
-  MapState state_;                        // only used by the mapping thread
+  Mapper mapper_;                                               // only used by the mapping thread
+  MapFolderWatch folder_watch_{mapper_};                        // only used by the mapping thread
+  MapState state_;                                              // only used by the mapping thread
+  WarningThrottle publishing_faults_{std::chrono::seconds(5)};  // only used by the mapping thread
   FramePoses poses_;
   std::atomic<std::uint32_t> surfels_{0};  ///< in the map, for reports of frames that are not mapped
   std::atomic<std::uint64_t> sequence_{0};
@@ -121,7 +123,7 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
-  diagnostics_->set_map(mapper_.statistics());
+  diagnostics_->set_map(mapper_.statistics(), mapper_.size_on_disk());
   tell_parameters();
   poses_.start(nh_);
   for (const auto& camera : cameras_) camera->start(nh_, pnh_);
@@ -224,7 +226,7 @@ void MapperRos::Impl::map(CameraInput& camera, const CompleteImage& image) {
     map.map_bytes = message.map_bytes;
     map.seen_bytes = message.seen_bytes;
     map.device_bytes = message.device_bytes;
-    diagnostics_->set_map(map);
+    diagnostics_->set_map(map, mapper_.size_on_disk());
   } catch (const DroppedFrame& fault) {
     drop(fault.result, fault.what());
   } catch (const BadFrame& fault) {
@@ -251,6 +253,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   message.header = header;
   message.result = FrameReport::INTEGRATED;
   message.reason = camera.remarks().on(frame, *image.info, Clock::now());
+  if (!pixels.color_fault().empty()) camera.remarks().warn_of_pixels(pixels.color_fault(), Clock::now());
   message.wait_ms = wait_ms;
   message.latency_ms = ms_since(image.arrival.time);
   return message;
@@ -270,17 +273,18 @@ void MapperRos::Impl::show_other_map() {
   surfels_ = static_cast<std::uint32_t>(mapper_.size());
   sequence_ = mapper_.sequence();
   state_.stamp = ros::Time::now();
-  diagnostics_->set_map(mapper_.statistics());
+  diagnostics_->set_map(mapper_.statistics(), mapper_.size_on_disk());
 }
 
 void MapperRos::Impl::publish_changes() {
   if (!publisher_->wants_changes()) return;
-  const std::uint64_t since = publisher_->sequence();
-  if (since == mapper_.sequence()) return;
+  if (publisher_->sequence() == mapper_.sequence()) return;
   try {
-    publisher_->push(mapper_.changes(since), since, state_);
+    Changes changes = mapper_.changes(publisher_->sequence());
+    const std::uint64_t since = changes.since;  // 0 if the publisher has waited for so long that it must begin again
+    publisher_->push(std::move(changes), since, state_);
   } catch (const std::exception& fault) {
-    ROS_ERROR_THROTTLE(5, "The map cannot be published: %s", fault.what());
+    if (publishing_faults_.due(fault.what(), Clock::now()) > 0) ROS_ERROR("The map cannot be published: %s", fault.what());
   }
 }
 
@@ -332,14 +336,14 @@ bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBo
 bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
   return answer(response, [&] {
     if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
-    const auto surfels = worker_->run_job([&] { return mapper_.whole_map(); });
+    const SavedMap map = worker_->run_job([&] { return mapper_.saved_map(); });
     const std::string path = absolute_path(request.path);
     std::error_code ignored;  // a name may be too long to be asked for
-    if (surfels.empty() && std::filesystem::is_regular_file(path, ignored))
+    if (map.surfels.empty() && std::filesystem::is_regular_file(path, ignored))
       throw FileError("The map is empty, and was not written over the existing file " + path +
                       ": delete the file, or choose another path.");
-    write_map(path, surfels);  // on this thread, so that mapping goes on
-    const std::string done = std::to_string(surfels.size()) + " surfels were written to " + path + ".";
+    write_map(path, map);  // on this thread, so that mapping goes on
+    const std::string done = std::to_string(map.surfels.size()) + " surfels were written to " + path + ".";
     ROS_INFO("%s", done.c_str());
     return done;
   });

@@ -81,13 +81,16 @@ bool MapArchive::is_stored(const BlockKey& block) const {
 }
 
 void MapArchive::note_stored(const BlockKey& block) {
-  if (!is_stored(block) && folder_.contains(block)) stored_[region_of(block)].push_back(block);
+  if (is_stored(block) || !folder_.contains(block)) return;
+  stored_[region_of(block)].push_back(block);
+  stored_surfels_ += folder_.surfels(block);
 }
 
 void MapArchive::forget_stored(const BlockKey& block) {
   const auto region = stored_.find(region_of(block));
   region->second.erase(std::find(region->second.begin(), region->second.end(), block));
   if (region->second.empty()) stored_.erase(region);
+  stored_surfels_ -= folder_.surfels(block);
 }
 
 bool MapArchive::follow(const Eigen::Vector3d& camera, double reach, std::uint32_t frame) {
@@ -275,6 +278,7 @@ void MapArchive::add_stored(SavedMap& map) const {
 void MapArchive::clear() {
   folder_.clear();
   stored_.clear();
+  stored_surfels_ = 0;
   followed_.reset();
   noted_.clear();
   fault_ = nullptr;

@@ -60,6 +60,9 @@ class MapArchive {
   /// Why the last save could not be written; empty if all is well. From any thread.
   std::string fault() const { return folder_.fault(); }
 
+  /// Number of surfels on disk only, which costs nothing.
+  std::size_t stored_size() const { return stored_surfels_; }
+
   /// Forgets everything on disk.
   void clear();
 
@@ -87,6 +90,7 @@ class MapArchive {
   const double radius_;  ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
+  std::size_t stored_surfels_ = 0;               ///< in these blocks
   std::optional<Eigen::Vector3d> followed_;      ///< where the camera was when blocks last came and went
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
   std::set<std::uint64_t> saved_views_;          ///< numbers of the views on disk

@@ -16,6 +16,7 @@
 
 #include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
+#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -204,13 +205,16 @@ void MapDatabase::check_place() const {
                   "another folder.");
 }
 
-void MapDatabase::for_each_block(const std::function<void(BlockKey, std::size_t)>& visit) const {
+void MapDatabase::for_each_block(const std::function<void(BlockKey, std::size_t, std::size_t)>& visit) const {
   const std::lock_guard<std::mutex> lock(connections_->reading);
   try {
-    SQLite::Statement all(connections_->reader, "SELECT x, y, z, length(bytes) FROM blocks");
+    SQLite::Statement all(connections_->reader, "SELECT x, y, z, length(bytes), substr(bytes, 1, 8) FROM blocks");
+    static_assert(kStoredHead == 8);
     while (all.executeStep()) {
       const BlockKey key = {all.getColumn(0).getInt(), all.getColumn(1).getInt(), all.getColumn(2).getInt()};
-      visit(key, static_cast<std::size_t>(all.getColumn(3).getInt64()));
+      const SQLite::Column head = all.getColumn(4);
+      const std::size_t surfels = surfels_of(static_cast<const std::uint8_t*>(head.getBlob()), static_cast<std::size_t>(head.getBytes()));
+      visit(key, static_cast<std::size_t>(all.getColumn(3).getInt64()), surfels);
     }
   } catch (const SQLite::Exception& error) {
     throw explained(folder_, error);

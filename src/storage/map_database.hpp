@@ -19,8 +19,8 @@ class MapDatabase {
   MapDatabase(const std::string& folder, double block_size);
   ~MapDatabase();
 
-  /// Calls visit(key, number of bytes) for every block.
-  void for_each_block(const std::function<void(BlockKey, std::size_t)>& visit) const;
+  /// Calls visit(key, number of bytes, number of surfels) for every block.
+  void for_each_block(const std::function<void(BlockKey, std::size_t, std::size_t)>& visit) const;
 
   /// One transaction: all or nothing. @param clear  erases everything before
   /// @throws FileError  also if the folder has been deleted, moved or replaced

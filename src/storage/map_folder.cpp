@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "frontier_surfels/types.hpp"
+#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -21,9 +22,9 @@ std::size_t bytes_in_memory(const std::vector<StoredBlock>& blocks) {
 }  // namespace
 
 MapFolder::MapFolder(const std::string& folder, double block_size) : database_(folder, block_size) {
-  database_.for_each_block([this](BlockKey key, std::size_t size) {
-    sizes_[key] = size;
-    bytes_ += size;
+  database_.for_each_block([this](BlockKey key, std::size_t bytes, std::size_t surfels) {
+    sizes_[key] = {bytes, surfels};
+    bytes_ += bytes;
   });
   thread_ = std::thread(&MapFolder::write_queued, this);
 }
@@ -62,6 +63,12 @@ std::vector<BlockKey> MapFolder::keys() const {
 std::uint64_t MapFolder::bytes() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return bytes_;
+}
+
+std::size_t MapFolder::surfels(BlockKey key) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto size = sizes_.find(key);
+  return size == sizes_.end() ? 0 : size->second.surfels;
 }
 
 void MapFolder::write(std::vector<StoredBlock>&& blocks) {
@@ -117,12 +124,12 @@ void MapFolder::enqueue(Batch&& batch) {
 
 void MapFolder::index(const StoredBlock& block) {
   const auto& [key, bytes] = block;
-  if (const auto old = sizes_.find(key); old != sizes_.end()) bytes_ -= old->second;
+  if (const auto old = sizes_.find(key); old != sizes_.end()) bytes_ -= old->second.bytes;
   bytes_ += bytes.size();
   if (bytes.empty()) {
     sizes_.erase(key);
   } else {
-    sizes_[key] = bytes.size();
+    sizes_[key] = {bytes.size(), surfels_of(bytes.data(), bytes.size())};
   }
   queued_[key] = &bytes;
 }

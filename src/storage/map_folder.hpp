@@ -32,9 +32,10 @@ class MapFolder {
 
   // From an index in memory, what is still queued included.
   bool contains(BlockKey key) const;
-  std::size_t size() const;            ///< blocks
-  std::vector<BlockKey> keys() const;  ///< sorted
-  std::uint64_t bytes() const;         ///< of all blocks
+  std::size_t size() const;                 ///< blocks
+  std::vector<BlockKey> keys() const;       ///< sorted
+  std::uint64_t bytes() const;              ///< of all blocks
+  std::size_t surfels(BlockKey key) const;  ///< of one block; 0 if it is not there
 
   /// Queues blocks (without bytes: to be erased) to be written in one transaction by a thread in the background. Waits while more than
   /// 64 MB are queued.
@@ -70,7 +71,10 @@ class MapFolder {
   MapDatabase database_;
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
-  std::unordered_map<BlockKey, std::size_t> sizes_;                        ///< [byte] of each block
+  struct Size {
+    std::size_t bytes, surfels;
+  };
+  std::unordered_map<BlockKey, Size> sizes_;                               ///< of each block
   std::uint64_t bytes_ = 0;                                                ///< their sum
   std::list<Batch> queue_;                                                 ///< the thread reads the first one without the mutex
   std::unordered_map<BlockKey, const std::vector<std::uint8_t>*> queued_;  ///< newest bytes of each block in queue_

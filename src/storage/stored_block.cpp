@@ -8,6 +8,7 @@
 namespace frontier_surfels {
 namespace {
 
+constexpr std::size_t kBytesOfSurfel = 16;  // packed, see surfel_packing.hpp
 constexpr std::int32_t kViews = std::numeric_limits<std::int32_t>::min();
 
 }  // namespace
@@ -20,6 +21,13 @@ std::vector<std::uint8_t> join(const StoredParts& parts) {
   bytes.insert(bytes.end(), parts.surfels.begin(), parts.surfels.end());
   bytes.insert(bytes.end(), parts.seen.begin(), parts.seen.end());
   return bytes;
+}
+
+std::size_t surfels_of(const std::uint8_t* bytes, std::size_t count) {
+  std::uint32_t head[2] = {0, 0};
+  static_assert(sizeof head == kStoredHead);
+  if (count >= sizeof head) std::memcpy(head, bytes, sizeof head);
+  return head[1] / kBytesOfSurfel;
 }
 
 StoredParts parts_of(const std::vector<std::uint8_t>& bytes) {

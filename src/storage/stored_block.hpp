@@ -18,6 +18,10 @@ struct StoredParts {
 /// there are neither surfels nor seen points.
 std::vector<std::uint8_t> join(const StoredParts& parts);
 
+/// Number of a block's surfels, from its first kStoredHead bytes; 0 if there are fewer bytes.
+std::size_t surfels_of(const std::uint8_t* bytes, std::size_t count);
+constexpr std::size_t kStoredHead = 8;
+
 /// @throws FileError  the bytes end too early
 StoredParts parts_of(const std::vector<std::uint8_t>& bytes);
 

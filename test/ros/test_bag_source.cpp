@@ -70,6 +70,20 @@ TEST_F(BagTest, WithoutTransformsThereIsNoIdentity) {
   EXPECT_TRUE(says(failure(), "as its child"));
 }
 
+TEST_F(BagTest, AnEmptyFrameIdIsNamed) {
+  for (const char* name : {"", "/"}) {
+    sensor_msgs::Image nameless = depth_message(10.25);
+    nameless.header.frame_id = name;
+    Handmade(path_).add_camera_and_motion().add("/depth/image", 10.25, nameless);
+    EXPECT_TRUE(says(failure(), "The frame_id of the first image on /depth/image is empty: its driver must set it")) << failure();
+    Handmade(path_).add_camera_and_motion().add("/depth/image", 10, depth_message(10)).add("/depth/image", 10.25, nameless);
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 1u);
+    ASSERT_EQ(source->skipped().size(), 1u);
+    EXPECT_TRUE(says(source->skipped()[0], "its frame_id is empty")) << source->skipped()[0];
+  }
+}
+
 TEST_F(BagTest, DamagedTransformsAreLeftOut) {
   tf2_msgs::TFMessage no_rotation = tf_message(10.5, "world", "camera", 7);
   no_rotation.transforms[0].transform.rotation.w = 0;
@@ -133,7 +147,12 @@ TEST_F(BagTest, OtherMessagesWithoutATimeDoNoHarm) {
 
 TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}}) {
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F),
+                             {nan, 1.0F},
+                             {1.0F, nan},
+                             {std::numeric_limits<float>::infinity(), 0.0F},
+                             {-100.0F, 0.0F},
+                             {100.0F, 65535.0F}}) {
     Handmade(path_).add_camera_and_motion().add("/depth/image/compressedDepth", 10, compressed_depth(10, a, b));
     EXPECT_TRUE(says(failure(), "/depth/image/compressedDepth cannot be used: its depth quantisation"));
     Handmade(path_)
@@ -145,6 +164,45 @@ TEST_F(BagTest, ImpossibleQuantisationIsNamed) {
     ASSERT_EQ(source->skipped().size(), 1u);
     EXPECT_TRUE(says(source->skipped()[0], "quantisation"));
   }
+}
+
+TEST_F(BagTest, DistortionWithoutPIsToldOnce) {
+  sensor_msgs::CameraInfo info = info_message(10);
+  for (const bool distorts : {false, true}) {
+    info.D.assign(5, distorts ? 0.1 : 0);
+    Handmade(path_)
+        .add("/depth/camera_info", 10, info)
+        .add("/tf", 10, tf_message(10, "world", "camera", 0))
+        .add("/tf", 11, tf_message(11, "world", "camera", 1))
+        .add("/depth/image", 10.25, depth_message(10.25))
+        .add("/depth/image", 10.5, depth_message(10.5));
+    const auto source = open_source(path_);
+    EXPECT_EQ(read_all(*source).size(), 2u);
+    const auto warnings = source->warnings();
+    ASSERT_EQ(warnings.size(), distorts ? 1u : 0u);
+    for (const std::string& warning : warnings)
+      EXPECT_TRUE(says(warning, "taken as rectified, with K. If they are not, choose with --depth-topic"));
+  }
+}
+
+TEST_F(BagTest, AlternatingSizesAreToldOnce) {
+  Handmade bag(path_);
+  bag.add("/tf", 10, tf_message(10, "world", "camera", 0)).add("/tf", 11, tf_message(11, "world", "camera", 1));
+  for (int n = 0; n < 8; ++n) {
+    const double stamp = 10 + 0.1 * n;
+    sensor_msgs::CameraInfo info = info_message(stamp);
+    sensor_msgs::Image image = depth_message(stamp);
+    if (n % 2 == 1) {  // of a smaller camera
+      info.height = image.height = kHeight - 1;
+      image.data.resize(image.step * image.height);
+    }
+    bag.add("/depth/camera_info", stamp, info).add("/depth/image", stamp, image);
+  }
+  bag.close();
+  const auto source = open_source(path_);
+  EXPECT_EQ(read_all(*source).size(), 8u);
+  ASSERT_EQ(source->warnings().size(), 1u);
+  EXPECT_TRUE(says(source->warnings()[0], "4x3 and of 4x2 pixels alternate: do two cameras publish on the topic? Choose the topics"));
 }
 
 TEST_F(BagTest, AStillCameraGetsAListOfTheTransforms) {

@@ -83,6 +83,28 @@ TEST_F(CameraInputs, TheMapperReadsTheMessagesOwnBytes) {
   EXPECT_FALSE(camera.input.next_stamp() || camera.input.take());
 }
 
+TEST_F(CameraInputs, SayWhyColourIsNotUsed) {
+  TestCamera camera(poses_, "left");
+  camera.add_info(info_message(10));
+  sensor_msgs::Image larger = color_message(10, "rgb8", {1, 2, 3}), unknown = color_message(11, "rgb9", {1, 2, 3});
+  larger.height *= 2;
+  larger.data.insert(larger.data.end(), larger.data.begin(), larger.data.end());
+  for (const sensor_msgs::Image& color : {larger, unknown, color_message(12, "rgb8", {1, 2, 3})})
+    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color), nullptr});
+  std::string faults[3];
+  for (std::string& fault : faults) {
+    camera.add(image_of("left", 10.0 + static_cast<double>(&fault - faults)));
+    const std::optional<CompleteImage> image = camera.input.take();
+    ASSERT_TRUE(image);
+    const CameraFrame frame(*image);
+    fault = frame.color_fault();
+    EXPECT_EQ(frame.view().color.has_value(), fault.empty());
+  }
+  EXPECT_NE(faults[0].find("4x6 pixels, the depth images 4x3"), std::string::npos) << faults[0];
+  EXPECT_NE(faults[1].find("'rgb9'"), std::string::npos) << faults[1];
+  EXPECT_EQ(faults[2], "");
+}
+
 TEST_F(CameraInputs, DoNotDisturbEachOthersStampsAndCameras) {
   TestCamera left(poses_, "left"), right(poses_, "right");
   left.add_info(info_message(1, 5));
@@ -164,6 +186,62 @@ TEST_F(CameraInputs, DropAtOnceWhatCanNeverHaveAPose) {
     EXPECT_EQ(image.result, FrameReport::DROPPED_NO_POSE);
     EXPECT_NE(image.reason.find("frame_id is empty"), std::string::npos) << image.reason;
   }
+}
+
+TEST_F(CameraInputs, RefuseImagesWhoseStampCannotBeATime) {
+  TestCamera camera(poses_, "left");
+  camera.add_info(info_message(10));
+  camera.add(image_of("left", 10));
+  ASSERT_TRUE(camera.input.take());
+  camera.add(image_of("nowhere", 11));  // waits
+  for (const ros::Time& stamp : {ros::Time(2147483648U, 0), ros::Time(4000000000U, 0), ros::TIME_MAX}) {
+    sensor_msgs::Image image = image_of("left", 10);
+    image.header.stamp = stamp;
+    camera.add(image);
+    ASSERT_EQ(camera.dropped.size(), 1U) << stamp;
+    EXPECT_EQ(camera.dropped[0].result, FrameReport::DROPPED_NO_POSE);
+    for (const std::string& part :
+         {"stamp of " + std::to_string(stamp.sec) + " s is later than in 2038", std::string("correct the camera's driver")})
+      EXPECT_NE(camera.dropped[0].reason.find(part), std::string::npos) << camera.dropped[0].reason;
+    camera.dropped.clear();
+  }
+  camera.add(image_of("left", 10.5));
+  EXPECT_TRUE(camera.dropped.empty()) << "there was no jump of time";
+  EXPECT_EQ(camera.input.next_stamp(), ros::Time(10.5));
+}
+
+TEST_F(CameraInputs, LeaveOutColourWhoseStampCannotBeATime) {
+  TestCamera camera(poses_, "left");
+  camera.add_info(info_message(10));
+  sensor_msgs::Image timeless = color_message(10, "rgb8", {1, 2, 3});
+  timeless.header.stamp = ros::TIME_MAX;
+  for (const sensor_msgs::Image& color : {color_message(9.9, "rgb8", {1, 2, 3}), timeless})
+    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color), nullptr});
+  camera.input.add_depth({{boost::make_shared<sensor_msgs::Image>(image_of("left", 10)), nullptr}, Clock::now() + std::chrono::hours(1)});
+  EXPECT_EQ(camera.ready, 0) << "colour of this time may still come";
+}
+
+TEST_F(CameraInputs, UseACameraInfoWhoseStampCannotBeATimeOnlyWhileThereIsNone) {
+  TestCamera camera(poses_, "left");
+  const auto focal_length_at = [&](double stamp) {
+    camera.add(image_of("left", stamp));
+    const std::optional<CompleteImage> image = camera.input.take();
+    return image ? CameraFrame(*image).view().intrinsics.fx : 0;
+  };
+  const auto add_timeless = [&](double focal_length) {
+    sensor_msgs::CameraInfo info = info_message(10, focal_length);
+    info.header.stamp = ros::TIME_MAX;
+    camera.add_info(info);
+  };
+  add_timeless(5);
+  EXPECT_EQ(focal_length_at(9), 5);
+  camera.add_info(info_message(10, 6));
+  EXPECT_EQ(focal_length_at(9.5), 6) << "the earliest of those with a time";
+  add_timeless(7);
+  EXPECT_EQ(focal_length_at(11), 6);
+  camera.add_info(info_message(12, 8));
+  EXPECT_EQ(focal_length_at(11.5), 6);
+  EXPECT_EQ(focal_length_at(12), 8);
 }
 
 TEST_F(CameraInputs, WaitForColourThatIsDue) {

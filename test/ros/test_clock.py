@@ -5,8 +5,10 @@ import time
 import rospy
 from frontier_surfels.msg import FrameReport
 from rosgraph_msgs.msg import Clock
+from tf2_msgs.msg import TFMessage
 
 from mapper_client import Mapper, MapperTest, run, wait_until
+from synthetic_camera import pose, transform
 
 STEPS = 3
 INTERVAL = 0.8  # [s]; a bag is then longer than the longest delay of an image
@@ -89,17 +91,26 @@ class ClockTest(MapperTest):
         self.assertGreater(report.surfels, 0)
 
     def test_impossible_stamps_reset_nothing(self):
-        """Images without a stamp or with one in the far future are dropped, and are not taken for a jump of time."""
+        """Images without a stamp or with one in the far future are dropped, and are not taken for a jump of time. Their pose is known."""
         start = self.now
         self.play(start)
+        self.camera.new_frame()
+        self.camera.tf_static.publish(TFMessage([transform(pose(2), 'map', self.camera.frame, rospy.Time.from_sec(start))]))
+        self.set_time(start + 2)
+        mapped = self.check_integrated(self.camera.send(2, stamp=rospy.Time.from_sec(start + 2), send_pose=False), self.resetting)
         before = self.resetting.surfels()
-        for stamp in (rospy.Time(0), rospy.Time(4000000000)):
+        for stamp, reason in ((rospy.Time(0), 'stamp is 0'), (rospy.Time(4000000000), 'stamp of 4000000000 s'),
+                              (rospy.Time(4294967295, 990000000), 'stamp of 4294967295 s')):
             header = self.camera.send(0, stamp=stamp, send_pose=False)
-            self.check_dropped(header, FrameReport.DROPPED_NO_POSE, '.', self.resetting)
+            self.check_dropped(header, FrameReport.DROPPED_NO_POSE, reason + '.*driver', self.resetting)
         self.assert_same_map(before, self.resetting.surfels())
-        self.set_time(start + 1)
-        self.check_integrated(self.camera.send(2, stamp=rospy.Time.from_sec(start + 1)), self.resetting)
-        self.assertGreaterEqual(len(self.resetting.surfels()), 0.8 * len(before))
+        self.set_time(start + 2.5)
+        report = self.check_integrated(self.camera.send(2, stamp=rospy.Time.from_sec(start + 2.5), send_pose=False), self.resetting)
+        self.assertEqual(report.sequence, mapped.sequence + 1)  # there was no reset
+
+    def test_transforms_of_the_far_future_block_nothing(self):
+        self.camera.send_pose(pose(0), rospy.Time(4000000000))
+        self.play(self.now)
 
 
 if __name__ == '__main__':

@@ -153,7 +153,12 @@ TEST(DepthMessages, ImpossibleQuantisationIsRefused) {
     return depth_pixels({nullptr, boost::make_shared<sensor_msgs::CompressedImage>(compressed_depth(1, a, b))});
   };
   EXPECT_EQ(pixels_of(100, 0).view.width, kWidth);
-  for (const auto& [a, b] : {std::pair(0.0F, 0.0F), {nan, 1.0F}, {1.0F, nan}, {std::numeric_limits<float>::infinity(), 0.0F}})
+  for (const auto& [a, b] : {std::pair(0.0F, 0.0F),
+                             {nan, 1.0F},
+                             {1.0F, nan},
+                             {std::numeric_limits<float>::infinity(), 0.0F},
+                             {-100.0F, 0.0F},
+                             {100.0F, 65535.0F}})
     EXPECT_THROW(pixels_of(a, b), BadFrame) << a << " " << b;
 }
 

@@ -69,12 +69,65 @@ TEST_F(Remarks, MillimetresAreNotTakenForFreeSpace) {
   EXPECT_EQ(about(carving, 7.0F), "");
 }
 
+TEST_F(Remarks, FarDepthsThatCarveAreToldOnceIfNothingElseComes) {
+  config_.carve_beyond_range = true;
+  FrameRemarks carving(config_, [this](const std::string& remark) { warned_.push_back(remark); });
+  double x = 0;
+  const auto on_next = [&](int millimetres) { return about(carving, static_cast<std::uint16_t>(millimetres), 8, x += 0.01); };
+  for (int n = 1; n < FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "") << n;
+  EXPECT_TRUE(says(on_next(20000), "None of the measured depths are from z_min"));
+  EXPECT_TRUE(says(warned_.back(), "correct depth_unit"));
+  for (int n = 0; n < 2 * FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "");
+  EXPECT_EQ(warned_.size(), 1U);
+}
+
+TEST_F(Remarks, ACameraMayLookAtAFarWallForAWhile) {
+  config_.carve_beyond_range = true;
+  FrameRemarks carving(config_, [](const std::string&) {});
+  double x = 0;
+  for (int n = 0; n < 4 * FrameRemarks::kFarFrames; ++n)
+    ASSERT_EQ(about(carving, static_cast<std::uint16_t>(n % 10 == 0 ? 1500 : 20000), 8, x += 0.01), "");
+}
+
+/// The pixels are all the same, so every n-th frame stands for every n-th pixel.
+TEST_F(Remarks, AWrongUnitIsFoundAlsoIfFewDepthsAreInRange) {
+  for (std::size_t n = 1; n < FrameRemarks::kDepthFrames; ++n) on(1500.0F);
+  warned_.clear();
+  const std::string remark = on(1.5F);
+  EXPECT_TRUE(says(remark, "Only 3.33 % of the measured depths are from z_min")) << remark;
+  EXPECT_TRUE(says(remark, "look like millimetres")) << remark;
+  EXPECT_EQ(warned_, std::vector<std::string>{remark});
+  EXPECT_EQ(on(1.5F), "") << "a share of more than 5 %";
+}
+
+TEST_F(Remarks, AFewFramesWithoutManyUsableDepthsAreUsual) {
+  for (std::size_t n = 2; n < FrameRemarks::kDepthFrames; ++n) on(0.1F);
+  EXPECT_EQ(on(1.5F), "");
+  remarks_.forget();
+  for (std::size_t n = 1; n < FrameRemarks::kDepthFrames; ++n) on(std::numeric_limits<float>::infinity());
+  EXPECT_EQ(on(1.5F), "") << "the camera looks into the open";
+  for (std::size_t n = 1; n < FrameRemarks::kDepthFrames; ++n) EXPECT_EQ(on(1.5F), "");
+  EXPECT_EQ(on(1.5F), "");
+}
+
 TEST_F(Remarks, EveryUnusableImageHasAReasonAndFewAreWarnedOf) {
   for (int n = 0; n < 5; ++n) EXPECT_NE(on_millimetres(0), "");
   EXPECT_EQ(warned_.size(), 1U);
   now_ += seconds(11);
   EXPECT_NE(on_millimetres(0), "");
   EXPECT_EQ(warned_.size(), 2U);
+}
+
+TEST_F(Remarks, AWarningAboutPixelsHidesNoOther) {
+  on_millimetres(0);
+  on_millimetres(20000);
+  remarks_.warn_of_pixels("A colour image is not used: it is empty.", now_);
+  remarks_.warn_of_pixels("A colour image is not used: it is empty.", now_);
+  on_millimetres(21000);
+  ASSERT_EQ(warned_.size(), 3U);
+  EXPECT_TRUE(says(warned_[0], "no measurement"));
+  EXPECT_TRUE(says(warned_[1], "depth_unit"));
+  EXPECT_TRUE(says(warned_[2], "colour"));
 }
 
 TEST_F(Remarks, DistortionWithoutPIsToldOnce) {

@@ -29,10 +29,10 @@ class Nodelets(MapperTest):
         for mapper in (self.left, self.right):
             self.assertTrue(mapper.reset().success)
 
-    def load_mapper(self, name):
+    def load_mapper(self, name, arguments=()):
         """Returns whether it was loaded."""
         try:
-            return self.load('/' + name, 'frontier_surfels/mapper', SOURCES, TARGETS, [], '').success
+            return self.load('/' + name, 'frontier_surfels/mapper', SOURCES, TARGETS, arguments, '').success
         except rospy.ServiceException:
             return False
 
@@ -77,7 +77,10 @@ class Nodelets(MapperTest):
         wait_until(lambda: len(self.left.reports) > count + 5, what='the other nodelet to go on')
         self.assertEqual(sorted(self.list().nodelets), ['/left', '/right'])
 
-    def test_wrong_parameters_refuse_to_load(self):
+    def test_wrong_parameters_and_arguments_refuse_to_load(self):
+        self.assertFalse(self.load_mapper('wrong', ['depth/image=foo']))
+        self.assertTrue(self.load_mapper('unbound', ['--no-bond']))  # an option of nodelet's
+        self.assertTrue(self.unload('/unbound').success)
         rospy.set_param('/wrong', {'z_max': -1.0, 'decimation': 'many'})
         self.addCleanup(rospy.delete_param, '/wrong')
         self.assertFalse(self.load_mapper('wrong'))

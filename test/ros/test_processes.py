@@ -148,7 +148,7 @@ class Processes(unittest.TestCase):
         self.addCleanup(shutil.rmtree, folder)
         path = os.path.join(folder, 'map.ply')
         self.assertTrue(source.save(path).success)
-        stamps, counted = {}, []
+        stamps = {}
         self.start('shown')
         shown = Mapper('shown')
         shown.wait_until_connected()
@@ -159,20 +159,38 @@ class Processes(unittest.TestCase):
             subscriber = rospy.Subscriber(topic, kind, lambda message: stamps.setdefault(topic, stamp_of(message)))
             self.addCleanup(subscriber.unregister)
 
-        def read(array):
-            counted.extend(entry.value for status in array.status if status.name.startswith('shown') for entry in status.values
-                           if entry.key == 'surfels')
-
         for topic in ('shown/surfels', 'shown/occupied', 'shown/frontier'):
             see(topic, PointCloud2, lambda message: message.header.stamp)
         see('shown/update', SurfelUpdate, lambda message: message.header.stamp)
         see('shown/markers', MarkerArray, lambda message: message.markers[-1].header.stamp)
-        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, read)
-        self.addCleanup(subscriber.unregister)
         wait_until(lambda: len(stamps) == 5, what='all topics')
         for topic, stamp in stamps.items():
             self.assertTrue(start <= stamp <= rospy.Time.now(), (topic, stamp.to_sec(), start.to_sec()))
+        self.wait_for_surfels('shown', surfels)
+
+    def wait_for_surfels(self, name, surfels):
+        """Waits until /diagnostics of this mapper counts as many."""
+        counted = []
+
+        def read(array):
+            counted.extend(entry.value for status in array.status if status.name.startswith(name) for entry in status.values
+                           if entry.key == 'surfels')
+
+        subscriber = rospy.Subscriber('/diagnostics', DiagnosticArray, read)
+        self.addCleanup(subscriber.unregister)
         wait_until(lambda: str(surfels) in counted, what='the surfels in /diagnostics')
+
+    def test_a_reopened_map_is_counted_before_the_first_frame(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        camera, mapper = CameraTopics(), Mapper('earlier')
+        process = self.start('earlier', map_folder=folder)
+        mapper.wait_until_connected(*camera.raw())
+        surfels = mapper.report(camera.send(0)).surfels
+        self.check_ends(process)
+        self.start('later', map_folder=folder)
+        Mapper('later').wait_until_connected()
+        self.wait_for_surfels('later', surfels)
 
     def check_ends(self, process):
         """The process ends on SIGINT, as roslaunch sends it."""
@@ -212,6 +230,13 @@ class Processes(unittest.TestCase):
             self.assertRegex(result.stdout, 'usage: .*mapper_node')
             for word in ('depth/image', '~update', '~get_surfels', 'z_max', 'tf_timeout'):
                 self.assertIn(word, result.stdout)
+
+    def test_unknown_arguments_are_refused(self):
+        program = find_node('frontier_surfels', 'mapper_node')[0]
+        for argument, remedy in (('depth/image=foo', 'write depth/image:=foo'), ('--hlep', 'mapper_node --help'), ('foo', 'mapper_node --help')):
+            result = subprocess.run([program, '__name:=unknown', 'a:=b', '_z_max:=2', argument], capture_output=True, text=True, timeout=TIMEOUT)
+            self.assertEqual((result.returncode, result.stdout), (2, ''))
+            self.assertRegex(result.stderr, rf"^There is no argument '{argument}': [^\n]*{remedy}[^\n]*\.\n$")
 
     def test_ends_without_a_frame(self):
         process = self.start('idle')

@@ -24,7 +24,7 @@ void say_diagnostics(std::ostream& said) {
   Statistics map;
   map.surfels = 1234567;
   map.map_bytes = map.device_bytes = 1234567890;
-  status.set_map(map);
+  status.set_map(map, 0);
   diagnostic_updater::DiagnosticStatusWrapper filled;
   status.fill(filled, now);
   for (const auto& entry : filled.values) said << entry.key << ": " << entry.value << "\n";

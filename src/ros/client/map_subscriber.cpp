@@ -78,7 +78,8 @@ void MapSubscriber::on_update(const SurfelUpdateConstPtr& update) {
   try {
     receiver_.receive(*update);
   } catch (const std::exception& fault) {
-    ROS_WARN_THROTTLE(5, "An update of the map could not be applied: %s", fault.what());
+    if (warnings_.due(fault.what(), WarningThrottle::Clock::now()) > 0)
+      ROS_WARN("An update of the map could not be applied: %s", fault.what());
   }
 }
 

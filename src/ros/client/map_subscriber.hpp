@@ -9,6 +9,7 @@
 #include <functional>
 #include <string>
 
+#include "ros/input/warning_throttle.hpp"
 #include "ros/output/surfel_mirror.hpp"
 
 namespace frontier_surfels {
@@ -63,6 +64,7 @@ class MapSubscriber {
 
   ros::ServiceClient get_surfels_;
   UpdateReceiver receiver_;
+  WarningThrottle warnings_{std::chrono::seconds(5)};
   ros::Subscriber updates_;
 };
 

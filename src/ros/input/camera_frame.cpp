@@ -1,7 +1,6 @@
 #include "ros/input/camera_frame.hpp"
 
 #include <frontier_surfels/FrameReport.h>
-#include <ros/console.h>
 
 namespace frontier_surfels {
 namespace {
@@ -27,6 +26,8 @@ Intrinsics camera_of(const sensor_msgs::CameraInfo& info, const std::optional<cv
   });
 }
 
+std::string text_of(const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+
 }  // namespace
 
 CameraFrame::CameraFrame(const CompleteImage& image)
@@ -40,16 +41,14 @@ CameraFrame::CameraFrame(const CompleteImage& image)
 void CameraFrame::take_color(const messages::ImageMessage& message) {
   try {
     const messages::Pixels<ColorImage> color = messages::color_pixels(message);
-    if (color.view.width == depth_.view.width && color.view.height == depth_.view.height) {
+    const cv::Size size(color.view.width, color.view.height), depth_size(depth_.view.width, depth_.view.height);
+    if (size == depth_size)
       color_ = color;
-      return;
-    }
-    ROS_WARN_THROTTLE(10,
-                      "Colour images are not used: they are %dx%d pixels, the depth images %dx%d; remap color/image to one that is "
-                      "registered to depth.",
-                      color.view.width, color.view.height, depth_.view.width, depth_.view.height);
+    else
+      color_fault_ = "Colour images are not used: they are " + text_of(size) + " pixels, the depth images " + text_of(depth_size) +
+                     "; remap color/image to one that is registered to depth.";
   } catch (const BadFrame& fault) {
-    ROS_WARN_THROTTLE(10, "A colour image is not used: %s.", fault.what());
+    color_fault_ = std::string("A colour image is not used: ") + fault.what() + ".";
   }
 }
 

@@ -41,12 +41,15 @@ struct CompleteImage {
 /// A complete image as the mapper reads it. Pixels of raw messages are not copied: the messages are kept, and viewed.
 class CameraFrame {
  public:
-  /// Decodes compressed images. Colour that cannot be used is left out, with a warning.
+  /// Decodes compressed images. Colour that cannot be used is left out.
   /// @throws DroppedFrame if the depth image is damaged, or its camera_info does not fit
   explicit CameraFrame(const CompleteImage& image);
 
   /// Valid as long as this object.
   DepthFrame view() const;
+
+  /// Why the colour image is not used, as a sentence; empty if it is, or if there is none.
+  const std::string& color_fault() const { return color_fault_; }
 
  private:
   void take_color(const messages::ImageMessage& message);
@@ -54,6 +57,7 @@ class CameraFrame {
   double stamp_;  ///< [s]
   messages::Pixels<DepthImage> depth_;
   std::optional<messages::Pixels<ColorImage>> color_;
+  std::string color_fault_;
   Intrinsics intrinsics_;
   Eigen::Isometry3d T_world_camera_;
 };

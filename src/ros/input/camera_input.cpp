@@ -16,6 +16,9 @@ constexpr int kQueue = 10;  // messages; callbacks return at once, so that it is
 constexpr auto kPoll = std::chrono::milliseconds(1);
 constexpr auto kColorWait = std::chrono::milliseconds(30);  // a camera's period: mapping without colour is better than waiting longer
 
+/// End of a sentence about a stamp that cannot be a time.
+constexpr char kCorrectStamp[] = ", which is no time: correct the camera's driver, or the clock of its machine.";
+
 /// The topics of images, for people.
 std::string published_images() {
   using XmlRpc::XmlRpcValue;
@@ -123,13 +126,18 @@ void CameraInput::add_depth(const DepthArrival& arrival) {
 
 void CameraInput::add_info(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  infos_.add(info);
+  if (!infos_.add(info)) warn_of_stamp("A camera_info is", info->header.stamp);
 }
 
 void CameraInput::add_color(const messages::ImageMessage& image) {
   const std::lock_guard<std::mutex> lock(mutex_);
   color_came_ = true;
-  colors_.add(image, Clock::now());
+  if (!colors_.add(image, Clock::now())) warn_of_stamp("A colour image is", image.header().stamp);
+}
+
+void CameraInput::warn_of_stamp(const std::string& what, const ros::Time& stamp) {
+  const std::string warning = what + " not used: " + messages::late_stamp(stamp) + kCorrectStamp;
+  if (stamp_warnings_.due(warning, Clock::now()) > 0) ROS_WARN("%s", warning.c_str());
 }
 
 /// Finds out whether time has jumped back. If so, everything of later times is forgotten at once, because tf takes no transforms that are
@@ -138,6 +146,8 @@ std::vector<DroppedImage> CameraInput::follow_time(const std_msgs::Header& heade
   constexpr double kLate = 1;  // [s]; no delay of transport is longer
   if (header.stamp.isZero())
     throw DroppedFrame(FrameReport::DROPPED_NO_POSE, "The image's stamp is 0, which is no time: its driver must set it.");
+  if (!messages::is_believed(header.stamp))
+    throw DroppedFrame(FrameReport::DROPPED_NO_POSE, "A depth image cannot be used: " + messages::late_stamp(header.stamp) + kCorrectStamp);
   if (messages::strip_slash(header.frame_id).empty())
     throw DroppedFrame(FrameReport::DROPPED_NO_POSE,
                        "The image's frame_id is empty: its driver must set it to the camera's optical frame.");

@@ -99,6 +99,7 @@ class CameraInput {
   void tell(const std::vector<DroppedImage>& dropped) const;
 
   // With mutex_ locked
+  void warn_of_stamp(const std::string& what, const ros::Time& stamp);
   std::vector<DroppedImage> follow_time(const std_msgs::Header& header);
   std::optional<CompleteImage> complete(const DepthArrival& arrival, Clock::time_point now, bool last_chance) const;
   sensor_msgs::CameraInfoConstPtr info_of(const messages::ImageMessage& image) const;
@@ -116,6 +117,7 @@ class CameraInput {
   ColorImages colors_;
   bool paused_ = false, stopping_ = false;
   bool depth_came_ = false, color_came_ = false;
+  WarningThrottle stamp_warnings_{std::chrono::seconds(10)};
   ros::Time last_now_;            ///< ROS time when the last image arrived
   bool clock_went_back_ = false;  ///< since the last image that became ready
 

@@ -22,10 +22,14 @@ double offset(const messages::ImageMessage& image, const ros::Time& stamp) { ret
 
 }  // namespace
 
-void CameraInfos::add(const sensor_msgs::CameraInfoConstPtr& info) {
-  if (!infos_.empty() && same_camera(*info, *infos_.back())) return;
+bool CameraInfos::add(const sensor_msgs::CameraInfoConstPtr& info) {
+  if (!infos_.empty() && same_camera(*info, *infos_.back())) return true;
+  const bool is_believed = messages::is_believed(info->header.stamp);
+  if (!infos_.empty() && !is_believed) return false;
+  if (is_believed && !infos_.empty() && !messages::is_believed(infos_.front()->header.stamp)) infos_.clear();
   infos_.push_back(info);
   if (infos_.size() > kMostInfos) infos_.pop_front();
+  return true;
 }
 
 sensor_msgs::CameraInfoConstPtr CameraInfos::at(const ros::Time& stamp) const {
@@ -40,10 +44,12 @@ void CameraInfos::keep_last() {
   if (infos_.size() > 1) infos_.erase(infos_.begin(), infos_.end() - 1);
 }
 
-void ColorImages::add(const messages::ImageMessage& image, Clock::time_point now) {
+bool ColorImages::add(const messages::ImageMessage& image, Clock::time_point now) {
+  if (!messages::is_believed(image.header().stamp)) return false;
   last_arrival_ = now;
   images_.push_back(image);
   if (images_.size() > kMostColors) images_.pop_front();
+  return true;
 }
 
 messages::ImageMessage ColorImages::nearest(const ros::Time& stamp) const {

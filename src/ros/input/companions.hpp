@@ -13,7 +13,8 @@ namespace frontier_surfels {
 /// The camera_infos of one camera. Only those are kept in which the camera differs from the one before.
 class CameraInfos {
  public:
-  void add(const sensor_msgs::CameraInfoConstPtr& info);
+  /// One whose stamp cannot be a time is kept only while there is none, as with bags. @return false if it is not kept therefore
+  bool add(const sensor_msgs::CameraInfoConstPtr& info);
 
   /// The latest one with a stamp at or before `stamp`, else the earliest one that is kept; null before the first.
   sensor_msgs::CameraInfoConstPtr at(const ros::Time& stamp) const;
@@ -28,7 +29,8 @@ class CameraInfos {
 /// The latest colour images of one camera.
 class ColorImages {
  public:
-  void add(const messages::ImageMessage& image, Clock::time_point now);
+  /// @return false if the stamp cannot be a time, and the image is left out
+  bool add(const messages::ImageMessage& image, Clock::time_point now);
 
   /// The image whose stamp is nearest to `stamp`; empty if none is within kColorTolerance.
   messages::ImageMessage nearest(const ros::Time& stamp) const;

@@ -20,6 +20,7 @@ namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
 constexpr bool kThisMachineIsBigEndian = BOOST_ENDIAN_BIG_BYTE;
+constexpr float kSixteenBits = 65535;  // largest value of a compressedDepth's pixels
 
 /// Checks that an image has as many bytes as its size asks for. Computes in 64 bits, because damaged sizes overflow 32.
 void check_size(const sensor_msgs::Image& image, std::size_t bytes_per_pixel) {
@@ -124,7 +125,7 @@ cv::Mat decode_depth(const sensor_msgs::CompressedImage& message) {
   CompressedDepthHeader header;
   std::memcpy(&header, message.data.data(), sizeof(header));
   const auto [a, b] = header.quantisation;
-  if (!std::isfinite(a) || !std::isfinite(b) || a == 0)
+  if (!std::isfinite(a) || !std::isfinite(b) || a <= 0 || b >= kSixteenBits)  // no value would be a positive depth
     throw BadFrame("its depth quantisation (" + rounded_text(a, 6) + ", " + rounded_text(b, 6) +
                    ") is not valid: record it again with compressed_depth_image_transport, or record raw images");
   return metres_from_inverse(values, header.quantisation);
@@ -232,6 +233,8 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
   if (!translation.allFinite() || !rotation.coeffs().allFinite() || rotation.norm() < 1e-3) throw BadFrame("its pose is not finite");
   return Eigen::Translation3d(translation) * rotation.normalized();
 }
+
+std::string late_stamp(const ros::Time& stamp) { return "its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038"; }
 
 std::string strip_slash(const std::string& name) {
   const std::size_t start = name.find_first_not_of('/');

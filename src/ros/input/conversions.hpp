@@ -6,6 +6,8 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
+#include <cstdint>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -63,6 +65,15 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
 
 /// Largest difference of stamps between a depth image and the colour image that belongs to it [s].
 constexpr double kColorTolerance = 0.030;
+
+/// Latest time that is believed [s]; in the year 2038. Some drivers write the largest time, 2^32 s, for "no time".
+constexpr std::int32_t kLatestTime = std::numeric_limits<std::int32_t>::max();
+
+/// Whether a stamp can be a time: if not, what has it is used neither live nor from a bag.
+inline bool is_believed(const ros::Time& stamp) { return stamp <= ros::Time(kLatestTime, 0); }
+
+/// What is wrong with a stamp that is not believed: "its stamp of 4294967295 s is later than in 2038".
+std::string late_stamp(const ros::Time& stamp);
 
 /// The time from `from` to `to` [s]. Unlike ros::Duration it never throws, however far apart the stamps are.
 inline double seconds(const ros::Time& from, const ros::Time& to) {

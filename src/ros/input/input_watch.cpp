@@ -6,7 +6,6 @@ namespace frontier_surfels {
 namespace {
 
 constexpr auto kPatience = std::chrono::seconds(5);
-constexpr auto kBetween = std::chrono::seconds(30);
 
 }  // namespace
 
@@ -16,7 +15,7 @@ InputWatch::InputWatch(const ros::NodeHandle& nh, const std::vector<std::unique_
 }
 
 void InputWatch::look() {
-  const Throttle::Clock::time_point now = Throttle::Clock::now();
+  const WarningThrottle::Clock::time_point now = WarningThrottle::Clock::now();
   if (now - start_ < kPatience) return;
   std::vector<std::string> sentences;
   if (ros::Time::isSimTime() && ros::Time::now().isZero())
@@ -27,7 +26,7 @@ void InputWatch::look() {
     for (const std::string& sentence : camera->missing()) sentences.push_back(sentence);
   }
   for (const std::string& sentence : sentences) {
-    if (told_.try_emplace(sentence, kBetween).first->second.is_due(now)) tell_(sentence);
+    if (told_.due(sentence, now) > 0) tell_(sentence);
   }
 }
 

@@ -5,12 +5,12 @@
 #include <ros/wall_timer.h>
 
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "ros/input/camera_input.hpp"
+#include "ros/input/warning_throttle.hpp"
 
 namespace frontier_surfels {
 
@@ -28,9 +28,9 @@ class InputWatch {
 
   const std::vector<std::unique_ptr<CameraInput>>& cameras_;
   const Tell tell_;
-  const Throttle::Clock::time_point start_ = Throttle::Clock::now();
-  std::map<std::string, Throttle> told_;  ///< by sentence
-  ros::WallTimer timer_;                  // not ROS time, which may be what is missing
+  const WarningThrottle::Clock::time_point start_ = WarningThrottle::Clock::now();
+  WarningThrottle told_{std::chrono::seconds(30)};
+  ros::WallTimer timer_;  // not ROS time, which may be what is missing
 };
 
 }  // namespace frontier_surfels

@@ -1,4 +1,4 @@
-/// Limits how often a warning is given.
+/// Limits how often something is done.
 #pragma once
 
 #include <chrono>
@@ -6,14 +6,14 @@
 
 namespace frontier_surfels {
 
-/// Counts in steady time, unlike ROS_WARN_THROTTLE, which is silent while ROS time is 0. For one thread.
+/// Counts in steady time. For one thread.
 class Throttle {
  public:
   using Clock = std::chrono::steady_clock;
 
   explicit Throttle(Clock::duration between) : between_(between) {}
 
-  /// Whether the warning may be given now, which is then counted as done.
+  /// Whether it may be done now, which is then counted as done.
   bool is_due(Clock::time_point now) {
     if (last_ && now - *last_ < between_) return false;
     last_ = now;

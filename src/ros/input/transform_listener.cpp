@@ -11,14 +11,13 @@ namespace frontier_surfels {
 using messages::strip_slash;
 
 std::string fault_of(const geometry_msgs::TransformStamped& transform, bool is_static) {
-  constexpr std::uint32_t kLastSecond = 4294960000;  // tf adds the length of its memory to stamps, which must not overflow
-  constexpr double kTolerance = 1e-2;                // tf's own
+  constexpr double kTolerance = 1e-2;  // tf's own
   const std::string parent = strip_slash(transform.header.frame_id), child = strip_slash(transform.child_frame_id);
   if (child.empty()) return "its child_frame_id is empty";
   if (parent.empty()) return "its frame_id is empty";
   if (parent == child) return "both its frames are the same";
-  if (!is_static && transform.header.stamp.sec > kLastSecond)
-    return "its stamp of " + std::to_string(transform.header.stamp.sec) + " s is the end of what a stamp can hold";
+  // tf would take all true stamps for too old, and its own sums overflow near the largest stamp.
+  if (!is_static && !messages::is_believed(transform.header.stamp)) return messages::late_stamp(transform.header.stamp);
   const geometry_msgs::Quaternion& q = transform.transform.rotation;
   const geometry_msgs::Vector3& t = transform.transform.translation;
   if (!std::isfinite(t.x + t.y + t.z + q.x + q.y + q.z + q.w)) return "its numbers are not finite";
@@ -49,9 +48,10 @@ void TransformListener::add(const geometry_msgs::TransformStamped& transform, co
   } catch (const std::exception& error) {
     fault = error.what();
   }
-  if (fault.empty() || !warnings_.is_due(Throttle::Clock::now())) return;
-  ROS_WARN("A transform from '%s' to '%s' is not used: %s. Correct it in the node that sends it, %s.", transform.child_frame_id.c_str(),
-           transform.header.frame_id.c_str(), fault.c_str(), sender.c_str());
+  if (fault.empty()) return;
+  const std::string warning = "A transform from '" + transform.child_frame_id + "' to '" + transform.header.frame_id +
+                              "' is not used: " + fault + ". Correct it in the node that sends it, " + sender + ".";
+  if (warnings_.due(warning, WarningThrottle::Clock::now()) > 0) ROS_WARN("%s", warning.c_str());
 }
 
 /// tf takes no transforms that are much older than those it has. They are forgotten when ROS time goes back.

@@ -11,7 +11,7 @@
 
 #include <string>
 
-#include "ros/input/throttle.hpp"
+#include "ros/input/warning_throttle.hpp"
 
 namespace frontier_surfels {
 
@@ -20,7 +20,7 @@ std::string fault_of(const geometry_msgs::TransformStamped& transform, bool is_s
 
 /// Puts the transforms of /tf and /tf_static into a buffer, on a thread of its own. tf2_ros' own listener ends the node at a transform
 /// whose stamp is near the largest one, and tf2 prints two lines for each transform that it cannot use: here such transforms are left out,
-/// with one warning every few seconds.
+/// with one warning every few seconds for each fault.
 class TransformListener {
  public:
   TransformListener(tf2::BufferCore& buffer, const ros::NodeHandle& nh);
@@ -34,7 +34,7 @@ class TransformListener {
 
   tf2::BufferCore& buffer_;
   ros::Time last_now_;
-  Throttle warnings_{std::chrono::seconds(5)};
+  WarningThrottle warnings_{std::chrono::seconds(5)};
   ros::CallbackQueue queue_;
   ros::Subscriber moving_, static_;
   ros::AsyncSpinner spinner_{1, &queue_};  // the last member: it calls back

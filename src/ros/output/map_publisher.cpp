@@ -147,7 +147,7 @@ void MapPublisher::run() {
       publish_what_is_due();
       ask_again();
     } catch (const std::exception& fault) {
-      ROS_WARN_THROTTLE(5, "Publishing the map failed and is tried again: %s", fault.what());
+      warn("Publishing the map failed and is tried again: ", fault);
       start_over();  // changes may have been lost
     }
   }
@@ -226,7 +226,7 @@ bool MapPublisher::apply(const PushedChanges& pushed, Eigen::AlignedBox3f& box) 
   try {
     box = map_.apply(pushed.changes, pushed.since, [this](const Surfel& surfel, bool comes) { markers_.touch(surfel, comes); });
   } catch (const std::exception& fault) {
-    ROS_WARN_THROTTLE(5, "The copy of the map that is published is built again, because changes could not be applied: %s", fault.what());
+    warn("The copy of the map that is published is built again, because changes could not be applied: ", fault);
     start_over();
     return false;
   }
@@ -234,6 +234,12 @@ bool MapPublisher::apply(const PushedChanges& pushed, Eigen::AlignedBox3f& box) 
   ++pushes_;
   if (is_first || !box.isEmpty()) ++version_;
   return true;
+}
+
+/// Each kind of warning every few seconds at most.
+void MapPublisher::warn(const std::string& what, const std::exception& fault) {
+  const std::string warning = what + fault.what();
+  if (warnings_.due(warning, Clock::now()) > 0) ROS_WARN("%s", warning.c_str());
 }
 
 void MapPublisher::start_over() {
@@ -275,7 +281,7 @@ void MapPublisher::publish(Topic topic, Make make) {
     else
       publishers_[topic].publish(serialized(make()));
   } catch (const std::exception& fault) {
-    ROS_WARN_THROTTLE(5, "A message on %s was left out: %s", publishers_[topic].getTopic().c_str(), fault.what());
+    warn("A message on " + publishers_[topic].getTopic() + " was left out: ", fault);
     if (topic == kMarkers) markers_.forget();
   }
 }

@@ -19,6 +19,7 @@
 #include <thread>
 
 #include "ros/input/parameters.hpp"
+#include "ros/input/warning_throttle.hpp"
 #include "ros/output/surfel_markers.hpp"
 #include "ros/output/surfel_messages.hpp"
 #include "ros/output/surfel_mirror.hpp"
@@ -78,6 +79,7 @@ class MapPublisher {
   bool is_stale(Topic topic) const;
   void apply_and_tell(const std::deque<PushedChanges>& queue);
   bool apply(const PushedChanges& pushed, Eigen::AlignedBox3f& box);
+  void warn(const std::string& what, const std::exception& fault);
   void start_over();
   void publish_what_is_due();
   void publish_update(messages::UpdateMessages update);
@@ -112,6 +114,7 @@ class MapPublisher {
   SurfelMirror map_;
   SurfelMarkers markers_;
   MapState state_;
+  WarningThrottle warnings_{std::chrono::seconds(5)};
   std::uint64_t pushes_ = 0;                      ///< number of pushes that have been applied
   std::uint64_t version_ = 0;                     ///< number of these that have changed something
   std::array<std::uint64_t, kTopics> sent_ = {};  ///< version_ (for markers: pushes_) that was published last

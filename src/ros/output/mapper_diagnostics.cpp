@@ -3,11 +3,6 @@
 #include <ros/console.h>
 
 namespace frontier_surfels {
-namespace {
-
-constexpr auto kBetween = std::chrono::seconds(5);  // shortest time between two warnings with the same result
-
-}  // namespace
 
 MapperDiagnostics::MapperDiagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& pnh, const std::string& device,
                                      const std::string& depth_topic)
@@ -35,17 +30,14 @@ void MapperDiagnostics::add(const FrameReport& report) {
 }
 
 void MapperDiagnostics::warn(const FrameReport& report, Clock::time_point now) {
-  auto& last = warned_[report.result];
-  if (last != Clock::time_point() && now - last < kBetween) return;
-  last = now;
-  const std::uint64_t count = status_.count(report.result), since = count - counts_told_[report.result];
-  counts_told_[report.result] = count;
-  ROS_WARN("%s (%lu depth image%s dropped)", report.reason.c_str(), static_cast<unsigned long>(since), since == 1 ? "" : "s");
+  const std::size_t count = warnings_.due(report.reason, now);
+  if (count == 0) return;
+  ROS_WARN("%s (%zu depth image%s dropped)", report.reason.c_str(), count, count == 1 ? "" : "s");
 }
 
-void MapperDiagnostics::set_map(const Statistics& map) {
+void MapperDiagnostics::set_map(const Statistics& map, std::size_t on_disk) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  status_.set_map(map);
+  status_.set_map(map, on_disk);
 }
 
 void MapperDiagnostics::set_paused(bool paused) {

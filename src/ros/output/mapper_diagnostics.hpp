@@ -4,10 +4,10 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
 
-#include <array>
 #include <mutex>
 #include <string>
 
+#include "ros/input/warning_throttle.hpp"
 #include "ros/output/mapping_status.hpp"
 
 namespace frontier_surfels {
@@ -17,11 +17,11 @@ class MapperDiagnostics {
  public:
   MapperDiagnostics(const ros::NodeHandle& nh, const ros::NodeHandle& pnh, const std::string& device, const std::string& depth_topic);
 
-  /// Counts a frame. If it was dropped, warns with the reason, at most every few seconds for each result.
+  /// Counts a frame. If it was dropped, warns with the reason, at most every few seconds for each kind of reason.
   void add(const FrameReport& report);
 
-  /// Sets the size of the map after a frame, a reset or a load.
-  void set_map(const Statistics& map);
+  /// Sets the size of the map after a frame, a reset or a load; see MappingStatus.
+  void set_map(const Statistics& map, std::size_t on_disk);
   void set_paused(bool paused);
   void set_map_folder_fault(const std::string& fault);  ///< empty: none
 
@@ -33,8 +33,7 @@ class MapperDiagnostics {
 
   std::mutex mutex_;
   MappingStatus status_;
-  std::array<std::uint64_t, MappingStatus::kResults> counts_told_ = {};
-  std::array<Clock::time_point, MappingStatus::kResults> warned_ = {};
+  WarningThrottle warnings_{std::chrono::seconds(5)};
   diagnostic_updater::Updater updater_;
   ros::WallTimer timer_;
 };

@@ -73,7 +73,8 @@ void MappingStatus::fill(diagnostic_updater::DiagnosticStatusWrapper& status, Cl
   for (std::uint8_t result = 0; result < kResults; ++result)
     status.add(std::string("frames ") + result_name(result), std::to_string(counts_[result]));
   if (counts_[FrameReport::FAILED] > 0) status.add("last failure", failure_);
-  status.add("surfels", std::to_string(map_.surfels));
+  status.add("surfels", std::to_string(map_.surfels + on_disk_));
+  status.add("surfels on disk only", std::to_string(on_disk_));
   status.add("memory of the map [MB]", fixed_text(static_cast<double>(map_.map_bytes) / 1e6, 1));
   status.add("memory of what has been seen [MB]", fixed_text(static_cast<double>(map_.seen_bytes) / 1e6, 1));
   status.add("memory on the device [MB]", fixed_text(static_cast<double>(map_.device_bytes) / 1e6, 1));

@@ -30,14 +30,16 @@ class MappingStatus {
 
   void add(const FrameReport& report, Clock::time_point now);
 
-  /// Sets the size of the map, which a frame, a reset or a load has changed.
-  void set_map(const Statistics& map) { map_ = map; }
+  /// Sets the size of the map, which a frame, a reset or a load has changed. @param on_disk  number of further surfels in the map folder
+  void set_map(const Statistics& map, std::size_t on_disk) {
+    map_ = map;
+    on_disk_ = on_disk;
+  }
   void set_paused(bool paused) { paused_ = paused; }
 
   /// Sets why the map folder cannot be written, which is an ERROR; empty: it can.
   void set_map_folder_fault(const std::string& fault);
 
-  std::uint64_t count(std::uint8_t result) const { return counts_[result]; }
   void fill(diagnostic_updater::DiagnosticStatusWrapper& status, Clock::time_point now);
 
  private:
@@ -57,7 +59,8 @@ class MappingStatus {
   std::string failure_;             ///< reason of the last frame that failed
   std::string map_folder_fault_;
   std::string last_reason_;  ///< of the last frame that was dropped
-  Statistics map_;
+  Statistics map_;           ///< in memory
+  std::size_t on_disk_ = 0;
   bool paused_ = false;
 };
 
