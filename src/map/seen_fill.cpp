@@ -27,6 +27,11 @@ constexpr double kLeastDepth = 0.2;   // mean depth behind the discs [spacing]
 constexpr std::size_t kDense = 16;  // surfels that reach into a brick
 constexpr double kFarthest = 8;     // [block]
 
+// The work is bounded: of more surfels in a brick every second one is asked, every third, and so on; and no surfel reaches further than a
+// brick.
+constexpr std::size_t kMostSurfels = 8192;
+constexpr double kMostScale = SEEN_BRICK / 2;  // [spacing]
+
 enum : std::uint8_t { kOpen = 0, kSeen = 1, kUnseen = 2 };
 
 /// Points are numbered (z SEEN_BRICK + y) SEEN_BRICK + x.
@@ -59,7 +64,7 @@ class Filling {
   /// Of a surfel's weights [m].
   double scale(const Surfel& surfel) const {
     const double least = 0.8 * spacing_;
-    return surfel.radius > least ? std::min<double>(surfel.radius, SEEN_BRICK * spacing_) : least;
+    return surfel.radius > least ? std::min<double>(surfel.radius, kMostScale * spacing_) : least;
   }
   void find_bricks();
   void label_near_surfels();
@@ -123,8 +128,9 @@ void Filling::label_near_surfels() {
 void Filling::label_points(Brick& brick) const {
   std::vector<double> sums(kPoints, 0.0), weights(kPoints, 0.0);
   const Eigen::Array3d corner = Eigen::Array3d(brick.key.x, brick.key.y, brick.key.z) * SEEN_BRICK + 0.5;  // the first point [spacing]
-  for (const std::uint32_t number : brick.surfels) {
-    const Surfel& surfel = surfels_[number];
+  const std::size_t stride = brick.surfels.size() / kMostSurfels + 1;
+  for (std::size_t n = 0; n < brick.surfels.size(); n += stride) {
+    const Surfel& surfel = surfels_[brick.surfels[n]];
     const double reach = 2 * scale(surfel);
     const Eigen::Vector3d p = surfel.position.cast<double>(), normal = surfel.normal.cast<double>();
     const Eigen::Array3i first = ((p.array() - reach) / spacing_ - corner).ceil().max(0).cast<int>(),
