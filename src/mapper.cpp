@@ -344,6 +344,7 @@ void Mapper::load(const SavedMap& map) {
 
 void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
+  SurfelMap::check(saved.surfels);
   const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size()) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there

@@ -114,10 +114,12 @@ TEST_F(MapFolderFiles, AnotherBlockSizeIsRefused) {
   EXPECT_EQ(content_of(MapFolder(path_, kBlockSize)), content);
 }
 
-TEST_F(MapFolderFiles, ANewerVersionIsRefused) {
+TEST_F(MapFolderFiles, OtherVersionsAreRefused) {
   make_folder(3);
-  run_sql("UPDATE meta SET version = 2");
+  run_sql("UPDATE meta SET version = 3");
   EXPECT_TRUE(says(fault_of_opening(path_), "newer version"));
+  run_sql("UPDATE meta SET version = 1");
+  EXPECT_TRUE(says(fault_of_opening(path_), "older version"));
 }
 
 TEST_F(MapFolderFiles, FilesOfOtherProgramsAreRefusedAndLeftAlone) {

@@ -54,7 +54,7 @@ Run run_of(int n) {
   run.device = "some device";
   run.frames = frames(n);
   run.skipped = {"No pose.", "No depth."};
-  run.statistics = {5000, 3000, 2000, 80000, 64500000};
+  run.statistics = {5000, 3000, 2000, 80000, 7000, 64500000};
   run.peak_rss_mb = 321.5;
   return run;
 }
@@ -146,7 +146,7 @@ TEST(Summary, HasExactlyTheKeysOfTheInterface) {
   EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
                               "surfels", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
-  EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes"}));
+  EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes", "seen_bytes"}));
   EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]), (Keys{"sweeps", "median"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]["sweeps"]), (Keys{"mean", "median"}));
@@ -169,6 +169,7 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_EQ(json["surfels"]["total"], 5000);
   EXPECT_EQ(json["surfels"]["occupied"], 3000);
   EXPECT_EQ(json["surfels"]["map_bytes"], 80000);
+  EXPECT_EQ(json["surfels"]["seen_bytes"], 7000);
   // Frames 6 to 12, of 6, 7, ... 12 ms
   EXPECT_DOUBLE_EQ(json["time_ms"]["mean"], 9);
   EXPECT_DOUBLE_EQ(json["time_ms"]["max"], 12);

@@ -117,6 +117,7 @@ ordered_json measure_stages(const Options& options, const std::vector<Input>& in
       for (const int threads : {1, 0}) {
         if (replay::stop_requested()) break;
         config.recent_views = views;
+        config.seen_points = views > 0;  // without views: the paper's known space
         config.threads = threads;
         rows.push_back(measure_row(options, input, config));
       }

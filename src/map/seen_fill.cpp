@@ -22,8 +22,16 @@ constexpr int kWhole = kPoints;                                // stands for all
 constexpr double kLeastWeight = 0.5;  // sum of the surfels' weights, which are 1 at most
 constexpr double kLeastDepth = 0.2;   // mean depth behind the discs [spacing]
 
-// Far from all surfels, the search would fill a box of any size. A room has 20 surfels a brick.
-constexpr std::size_t kMostBricks = 1000000;  // and one for each surfel
+// The search starts where there are many surfels, and goes no further than this: otherwise surfels that no mapper has made, far from each
+// other or alone, would fill all the world.
+constexpr std::size_t kDense = 16;            // surfels that reach into a brick
+constexpr double kFarthest = 8;               // [block]
+constexpr std::size_t kMostBricks = 1000000;  // and one for each surfel; a room has 20 surfels a brick
+
+// The work is bounded: of more surfels in a brick every second one is asked, every third, and so on; and no surfel reaches further than a
+// brick.
+constexpr std::size_t kMostSurfels = 8192;
+constexpr double kMostScale = SEEN_BRICK / 2;  // [spacing]
 
 enum : std::uint8_t { kOpen = 0, kSeen = 1, kUnseen = 2 };
 
@@ -43,7 +51,9 @@ class Filling {
     find_bricks();
     label_near_surfels();
     begin_search();
-    while (queued_seen_ > 0 && bricks_.size() < kMostBricks + surfels_.size()) search_next();
+    while (queued_seen_ > 0 && bricks_.size() < kMostBricks + surfels_.size() &&
+           static_cast<double>(distance_) * spacing_ < kFarthest * block_size_)
+      search_next();
     return result();
   }
 
@@ -54,7 +64,11 @@ class Filling {
     std::uint8_t label;
   };
 
-  double scale(const Surfel& surfel) const { return std::max<double>(surfel.radius, 0.8 * spacing_); }  ///< of its weights [m]
+  /// Of a surfel's weights [m].
+  double scale(const Surfel& surfel) const {
+    const double least = 0.8 * spacing_;
+    return surfel.radius > least ? std::min<double>(surfel.radius, kMostScale * spacing_) : least;
+  }
   void find_bricks();
   void label_near_surfels();
   void label_points(Brick& brick) const;
@@ -117,8 +131,9 @@ void Filling::label_near_surfels() {
 void Filling::label_points(Brick& brick) const {
   std::vector<double> sums(kPoints, 0.0), weights(kPoints, 0.0);
   const Eigen::Array3d corner = Eigen::Array3d(brick.key.x, brick.key.y, brick.key.z) * SEEN_BRICK + 0.5;  // the first point [spacing]
-  for (const std::uint32_t number : brick.surfels) {
-    const Surfel& surfel = surfels_[number];
+  const std::size_t stride = brick.surfels.size() / kMostSurfels + 1;
+  for (std::size_t n = 0; n < brick.surfels.size(); n += stride) {
+    const Surfel& surfel = surfels_[brick.surfels[n]];
     const double reach = 2 * scale(surfel);
     const Eigen::Vector3d p = surfel.position.cast<double>(), normal = surfel.normal.cast<double>();
     const Eigen::Array3i first = ((p.array() - reach) / spacing_ - corner).ceil().max(0).cast<int>(),
@@ -144,9 +159,11 @@ void Filling::label_points(Brick& brick) const {
 
 void Filling::begin_search() {
   const std::size_t near = bricks_.size();
-  for (std::uint32_t n = 0; n < near; ++n)
+  for (std::uint32_t n = 0; n < near; ++n) {
+    if (bricks_[n].surfels.size() < kDense) continue;
     for (int point = 0; point < kPoints; ++point)
       if (bricks_[n].labels[point] != kOpen) visit_neighbours({n, point, bricks_[n].labels[point]});
+  }
 }
 
 /// Gives a point, or a whole brick without surfels, a label if it has none.
@@ -241,9 +258,10 @@ SeenSpace fill_seen(const std::vector<Surfel>& surfels, double block_size, int s
 }
 
 int shift_for(const std::vector<Surfel>& surfels, double block_size) {
-  if (surfels.empty()) return 0;
   std::vector<float> radii;
-  for (const Surfel& surfel : surfels) radii.push_back(surfel.radius);
+  for (const Surfel& surfel : surfels)
+    if (surfel.radius > 0) radii.push_back(surfel.radius);
+  if (radii.empty()) return 0;
   const auto small = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 100);  // a few may be smaller than a mapper makes them
   std::nth_element(radii.begin(), small, radii.end());
   const double voxel = *small * 2 / std::sqrt(3.0);

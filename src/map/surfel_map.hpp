@@ -84,6 +84,9 @@ class SurfelMap {
   /// given again at once, as at first.
   void reserve_ids(std::optional<std::uint64_t> told);
 
+  /// @throws Error  replace() would refuse one of the surfels
+  static void check(const std::vector<Surfel>& surfels);
+
   /// Replaces the whole map in frame `frame`. A block's surfels fill its pages in their given order. If the device fails meanwhile, the map
   /// is lost until it is replaced again. @return slot of each surfel
   std::vector<std::uint32_t> replace(const std::vector<Surfel>& surfels, std::uint32_t frame);

@@ -50,14 +50,17 @@ struct PackedMap {
 
 }  // namespace
 
-std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
-  PackedMap packed{index_.emptied(removal(frame)), frame, {}, {}, {}};
-  std::vector<std::uint32_t> slots;
-  for (const Surfel& surfel : surfels) {
+void SurfelMap::check(const std::vector<Surfel>& surfels) {
+  for (const Surfel& surfel : surfels)
     if (!(surfel.position.array().abs() < kFarthest).all())  // true for NaN as well
       throw Error("A surfel's position is not finite or more than 1000 km from the world's origin: give positions in metres.");
-    slots.push_back(packed.add(surfel, block_size_));
-  }
+}
+
+std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels, std::uint32_t frame) {
+  check(surfels);
+  PackedMap packed{index_.emptied(removal(frame)), frame, {}, {}, {}};
+  std::vector<std::uint32_t> slots;
+  for (const Surfel& surfel : surfels) slots.push_back(packed.add(surfel, block_size_));
   packed.add_empty_pages(packed.index.end());
   grow(packed.index.end());
   close_window();

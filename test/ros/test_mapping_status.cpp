@@ -112,10 +112,12 @@ TEST_F(MappingStatusTest, ALoadedMapIsCountedBeforeTheFirstFrame) {
   Statistics map;
   map.surfels = 1234;
   map.map_bytes = 5000000;
+  map.seen_bytes = 300000;
   status_.set_map(map, 1000);
   EXPECT_EQ(value("surfels"), "2234");
   EXPECT_EQ(value("surfels on disk only"), "1000");
   EXPECT_EQ(value("memory of the map [MB]"), "5.0");
+  EXPECT_EQ(value("memory of what has been seen [MB]"), "0.3");
   EXPECT_EQ(filled().level, DiagnosticStatus::WARN) << "no image has come";
 }
 
