@@ -1,6 +1,5 @@
 /// Surfels as PLY files: binary little endian, vertex properties x y z nx ny nz radius (float), red green blue label (uchar; 1 occupied, 0
-/// frontier). What has been seen, and the kept views, may follow as elements seen_block (x y z, and a list of bytes) and kept_view
-/// (numbers, and a list of depths). Programs that look for a point cloud pass over them.
+/// frontier). What has been seen and the kept views may follow as an element `seen` of bytes, which other programs pass over.
 #pragma once
 
 #include <string>

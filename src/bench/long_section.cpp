@@ -69,7 +69,7 @@ ordered_json measure_long(const Options& options, const std::vector<Input>& inpu
                       {"surfels", report.surfels},
                       {"map_bytes", report.map_bytes},
                       {"seen_bytes", report.seen_bytes},
-                      {"working_bytes", report.device_bytes - report.map_bytes},
+                      {"working_bytes", working_memory(report)},
                       {"exact", exact_json(exact.score(mapper.surfels()))}});
       print_row(table, rows.back());
       times.clear();

@@ -78,7 +78,6 @@ ordered_json measure_row(const Options& options, const Input& input, const std::
     row["loaded"] = mapper.size();
     const auto run = run_frames(mapper, input, *source, options);
     add_figures(run, row);
-    row["bytes_a_surfel"] = double(row["map_bytes"]) / double(row["surfels"]);
     for (const auto& frame : replay::warm_frames(run.frames)) {
       times.wall_ms.push_back(frame.report.total_ms);
       times.cpu_ms.push_back(frame.cpu_ms);

@@ -33,12 +33,17 @@ ordered_json statistics_json(const std::vector<double>& values) {
           {"rsd_percent", statistics.rsd_percent}};
 }
 
+std::size_t working_memory(const Report& report) {
+  const std::size_t kept = report.map_bytes + report.seen_bytes;  // a little of which is the host's
+  return report.device_bytes > kept ? report.device_bytes - kept : 0;
+}
+
 void add_figures(const replay::Run& run, ordered_json& row) {
   const auto warm = replay::warm_frames(run.frames);
   std::vector<double> cpu_ms;
   for (const auto& frame : warm) cpu_ms.push_back(frame.cpu_ms);
   std::size_t working_bytes = 0;
-  for (const auto& frame : run.frames) working_bytes = std::max(working_bytes, frame.report.device_bytes - frame.report.map_bytes);
+  for (const auto& frame : run.frames) working_bytes = std::max(working_bytes, working_memory(frame.report));
   const Report& last = run.frames.back().report;
   row["device"] = run.device;
   row["frames"] = run.frames.size();
@@ -47,6 +52,8 @@ void add_figures(const replay::Run& run, ordered_json& row) {
   row["cpu_ms"] = statistics_json(cpu_ms);
   row["surfels"] = last.surfels;
   row["map_bytes"] = last.map_bytes;
+  row["seen_bytes"] = last.seen_bytes;
+  row["bytes_a_surfel"] = static_cast<double>(last.map_bytes + last.seen_bytes) / static_cast<double>(last.surfels);
   row["working_bytes"] = working_bytes;
   if (const auto warnings = replay::warnings(run); !warnings.empty()) row["warnings"] = warnings;
 }

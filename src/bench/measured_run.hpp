@@ -26,6 +26,9 @@ struct EmptyMap : Error {
 replay::Run run_frames(Mapper& mapper, const Input& input, replay::FrameSource& source, const Options& options,
                        const AfterFrame& after_frame = {});
 
+/// Memory on the device besides the map and what has been seen.
+std::size_t working_memory(const Report& report);
+
 /// Adds the number of frames, the times without the first frames, the number of surfels, the memory, and warnings about the
 /// recording if there are any, to `row`.
 void add_figures(const replay::Run& run, nlohmann::ordered_json& row);

@@ -98,7 +98,6 @@ ordered_json child_memory(const Options& options, const Input& input) {
     row["rss_constructed_mb"] = replay::peak_rss_mb();
     add_figures(run_frames(mapper, input, *source, options), row);
     row["rss_peak_mb"] = replay::peak_rss_mb();
-    row["bytes_a_surfel"] = double(row["map_bytes"]) / double(row["surfels"]);
   });
   return row;
 }
@@ -106,7 +105,7 @@ ordered_json child_memory(const Options& options, const Input& input) {
 ordered_json measure_memory(const Options& options, const std::vector<Input>& inputs) {
   ordered_json rows = ordered_json::array();
   const Table table("Memory in a new process, MB; RSS: largest so far, with the device's driver",
-                    {"input", "frames", "surfels", "map", "bytes a surfel", "working", "RSS before", "mapper made", "at the end"});
+                    {"input", "frames", "surfels", "map and seen", "bytes a surfel", "working", "RSS before", "mapper made", "at the end"});
   for (const Input& input : inputs) {
     if (replay::stop_requested()) break;
     ordered_json row = {{"input", input.name()}};
@@ -118,8 +117,9 @@ ordered_json measure_memory(const Options& options, const std::vector<Input>& in
       table.row({row["input"], row["error"]});
     } else {
       table.row({row["input"], std::to_string(int(row["frames"])), std::to_string(std::size_t(row["surfels"])),
-                 fixed(double(row["map_bytes"]) / 1e6, 1), fixed(row["bytes_a_surfel"], 1), fixed(double(row["working_bytes"]) / 1e6, 1),
-                 fixed(row["rss_before_mb"], 0), fixed(row["rss_constructed_mb"], 0), fixed(row["rss_peak_mb"], 0)});
+                 fixed((double(row["map_bytes"]) + double(row["seen_bytes"])) / 1e6, 1), fixed(row["bytes_a_surfel"], 1),
+                 fixed(double(row["working_bytes"]) / 1e6, 1), fixed(row["rss_before_mb"], 0), fixed(row["rss_constructed_mb"], 0),
+                 fixed(row["rss_peak_mb"], 0)});
     }
     rows.push_back(row);
   }

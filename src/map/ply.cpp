@@ -37,25 +37,21 @@ struct Sizes {
   int points = 0;         ///< of it, along a block's edge
   std::uint64_t blocks = 0;
   std::uint64_t views = 0;
+  std::uint64_t bytes = 0;  ///< of blocks and views
 };
 
 std::string header(const Sizes& sizes) {
   char line[160];
   std::snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\ncomment frontier_surfels 1 crc32 %08" PRIx32 "\n", sizes.crc);
   std::string text = line;
-  if (sizes.points > 0) text += "comment seen_block " + std::to_string(sizes.points) + " points " + text_of(sizes.block_size) + " m\n";
+  if (sizes.points > 0)
+    text += "comment seen " + std::to_string(sizes.points) + " points " + text_of(sizes.block_size) + " m " + std::to_string(sizes.blocks) +
+            " blocks " + std::to_string(sizes.views) + " views\n";
   text += "element vertex " + std::to_string(sizes.surfels) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"}) text += std::string("property float ") + name + "\n";
   for (const char* name : {"red", "green", "blue", "label"}) text += std::string("property uchar ") + name + "\n";
-  if (sizes.points > 0) {
-    text += "element seen_block " + std::to_string(sizes.blocks) + "\n";
-    for (const char* name : {"x", "y", "z"}) text += std::string("property int ") + name + "\n";
-    text += "property list uint uchar bytes\n";
-    text += "element kept_view " + std::to_string(sizes.views) + "\n";
-    for (const char* name : kViewNumbers) text += std::string("property double ") + name + "\n";
-    for (const char* name : {"width", "height"}) text += std::string("property int ") + name + "\n";
-    text += "property list uint ushort depth\n";
-  }
+  // Bytes one by one, because MeshLab loses its place in an element that has lists.
+  if (sizes.points > 0) text += "element seen " + std::to_string(sizes.bytes) + "\nproperty uchar byte\n";
   return text + kHeaderEnd;
 }
 
@@ -68,11 +64,12 @@ Sizes sizes_of(const std::string& header) {
   };
   sizes.crc = static_cast<std::uint32_t>(std::strtoul(after("crc32 "), nullptr, 16));
   sizes.surfels = std::strtoull(after("element vertex "), nullptr, 10);
-  sizes.points = static_cast<int>(std::strtoul(after("comment seen_block "), nullptr, 10));
-  sizes.blocks = std::strtoull(after("element seen_block "), nullptr, 10);
-  sizes.views = std::strtoull(after("element kept_view "), nullptr, 10);
+  sizes.bytes = std::strtoull(after("element seen "), nullptr, 10);
+  sizes.points = static_cast<int>(std::strtoul(after("comment seen "), nullptr, 10));
   const char* size = after(" points ");
   std::from_chars(size, size + std::strlen(size), sizes.block_size);
+  sizes.blocks = std::strtoull(after(" m "), nullptr, 10);
+  sizes.views = std::strtoull(after(" blocks "), nullptr, 10);
   return sizes;
 }
 
@@ -192,7 +189,8 @@ void write_ply(const std::string& path, const SavedMap& map) {
                        map.seen.block_size,
                        map.seen.points,
                        map.seen.blocks.size(),
-                       map.views.size()};
+                       map.views.size(),
+                       body.size() - map.surfels.size() * sizeof(Record)};
   replace_file(path, header(sizes), body.data(), body.size());
 }
 
@@ -205,7 +203,7 @@ SavedMap read_saved_ply(const std::string& path) {
   if (text != header(sizes))
     throw FileError(path + " is a PLY file of another layout than a saved map: give a file that was saved by this library.");
   const std::uint64_t size = file.body_bytes(text.size()), of_surfels = sizes.surfels * sizeof(Record);
-  const bool fits = size / sizeof(Record) >= sizes.surfels && (sizes.points > 0 || size == of_surfels);
+  const bool fits = size / sizeof(Record) >= sizes.surfels && size - of_surfels == (sizes.points > 0 ? sizes.bytes : 0);
   if (!fits) throw cut_off(path, sizes);
   const std::vector<std::uint8_t> body = file.body(text.size());
   if (checksum(body.data(), body.size()) != sizes.crc)

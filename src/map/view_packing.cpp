@@ -10,7 +10,7 @@ namespace frontier_surfels {
 namespace {
 
 struct Head {
-  std::array<double, std::size(kViewNumbers)> numbers;
+  std::array<double, kViewNumbers> numbers;
   std::int32_t width, height;
 };
 static_assert(sizeof(Head) == 17 * 8 + 2 * 4);

@@ -9,10 +9,9 @@
 
 namespace frontier_surfels {
 
-/// Numbers of a view (double), in the order of its bytes: T_world_camera column by column without the last row, the intrinsics, and the
+/// How many numbers (double) the bytes of a view begin with: T_world_camera column by column without the last row, the intrinsics, and the
 /// step of the depths. Width and height (int32), the number of depths (uint32) and the depths (uint16) follow.
-constexpr const char* kViewNumbers[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy",        "zz",
-                                        "tx", "ty", "tz", "fx", "fy", "cx", "cy", "depth_step"};
+constexpr std::size_t kViewNumbers = 17;
 
 std::vector<std::uint8_t> pack_view(const SavedView& view);
 
