@@ -14,6 +14,7 @@
 #include "map/seen_fill.hpp"
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
+#include "map/view_packing.hpp"
 #include "opencl/commands.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
@@ -220,7 +221,7 @@ Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry
   map.open_window(camera.grid(), T_world_camera);
   camera.set_image(image);
   views.set_current(image, T_world_camera);
-  seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : kSeenSpacing * camera.grid().delta_min);
+  seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : default_seen_spacing(camera.grid()));
   seen.open_window(map.window());
   return make_frame(camera, map.window(), views, config.seen_points ? &seen : nullptr, limits);
 }
@@ -302,6 +303,7 @@ std::vector<Surfel> Mapper::whole_map() const {
 SavedMap Mapper::saved_map() const {
   SavedMap map = on_device([&] { return impl_->saved_map(); });
   if (impl_->archive) impl_->archive->add_stored(map);
+  if (!impl_->config.seen_points) map.seen = {};  // it lacks what this mapper has seen: let it be filled in
   return map;
 }
 
@@ -345,6 +347,7 @@ void Mapper::load(const SavedMap& map) {
 void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
   SurfelMap::check(saved.surfels);
+  for (const SavedView& view : saved.views) check_view(view);
   const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size()) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there

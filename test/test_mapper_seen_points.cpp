@@ -207,8 +207,82 @@ TEST_F(MapperArchive, ThePaperDoesNotUseSeenPointsOfAFolder) {
   integrate_all(*std::make_unique<Mapper>(config), frames);
   config.seen_points = false;
   Mapper paper(config);
-  EXPECT_FALSE(paper.saved_map().seen.blocks.empty());
   EXPECT_TRUE(has_stage(paper.integrate(frames.back().view()), "sign_field"));
+}
+
+/// Views that nobody uses now stay in the folder for those who will.
+TEST_F(MapperArchive, ThePaperKeepsTheViewsOfAFolder) {
+  const Frames frames = orbit_frames(coarse_camera(), 10, 5);
+  Config config = few_views(20);
+  config.map_folder = path_;
+  integrate_all(*std::make_unique<Mapper>(config), frames);
+  Config paper = config;
+  paper.recent_views = 0;
+  paper.seen_points = false;
+  std::make_unique<Mapper>(paper)->flush();
+  EXPECT_EQ(Mapper(config).saved_map().views.size(), frames.size());
+}
+
+/// Cameras of other resolutions may come before anything has been forgotten.
+TEST_F(MapperArchive, BlocksWithoutSeenPointsDecideNoLattice) {
+  Frames frames = orbit_frames(coarse_camera(), 6, 5);
+  Intrinsics fine = coarse_camera();
+  for (double* number : {&fine.fx, &fine.fy, &fine.cx, &fine.cy}) *number *= 4;
+  fine.width *= 4;
+  fine.height *= 4;
+  const Frames others = orbit_frames(fine, 6, 5);
+  Config config = few_views(1);
+  config.recent_views = static_cast<int>(frames.size());
+  config.map_folder = path_;
+  {
+    Mapper mapper(config);
+    integrate_all(mapper, frames);
+    mapper.flush();  // blocks without seen points
+    integrate_all(mapper, others);
+    mapper.flush();
+  }
+  Mapper again(config);
+  EXPECT_FALSE(again.saved_map().seen.blocks.empty());
+  integrate_all(again, frames);
+}
+
+/// What such a map lacks is filled in when it is loaded, and not taken for never seen.
+TEST(MapperSeenPoints, AMapWithoutSeenPointsSaysSo) {
+  Config paper = few_views(0);
+  paper.seen_points = false;
+  Mapper mapper(paper);
+  integrate_all(mapper, orbit_frames(coarse_camera(), 6, 5));
+  const SavedMap saved = mapper.saved_map();
+  EXPECT_EQ(saved.seen.points, 0);
+  Mapper filled(few_views(0));
+  filled.load(saved);
+  EXPECT_FALSE(filled.saved_map().seen.blocks.empty());
+}
+
+TEST(MapperSeenPoints, UnsoundViewsAreRefused) {
+  Mapper mapper(few_views(5));
+  integrate_all(mapper, orbit_frames(coarse_camera(), 3, 5));
+  const SavedMap sound = mapper.saved_map();
+  const auto refused = [&](const std::function<void(SavedView&)>& spoil) {
+    SavedMap map = sound;
+    spoil(map.views.front());
+    EXPECT_THROW(mapper.load(map), FileError);
+    EXPECT_TRUE(same(mapper.surfels(), sound.surfels)) << "the map stays as it was";
+  };
+  refused([](SavedView& view) { view = SavedView(); });
+  refused([](SavedView& view) { view.depth.clear(); });
+  refused([](SavedView& view) { view.T_world_camera.translation().x() = std::nan(""); });
+}
+
+/// Near voxels are small: the points do not become as small as these.
+TEST(MapperSeenPoints, AreNoFinerThanTheVoxelsAtASixthOfTheRange) {
+  Config config = few_views(0);
+  Mapper usual(config);
+  integrate_all(usual, orbit_frames(coarse_camera(), 3, 5));
+  config.z_min = 0.1;
+  Mapper near(config);
+  integrate_all(near, orbit_frames(coarse_camera(), 3, 5));
+  EXPECT_EQ(near.saved_map().seen.points, usual.saved_map().seen.points);
 }
 
 }  // namespace

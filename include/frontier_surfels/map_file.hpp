@@ -11,7 +11,7 @@ namespace frontier_surfels {
 /// Writes the surfels by write_ply or write_pcd. @throws FileError  also if the path has another ending
 void write_map(const std::string& path, const std::vector<Surfel>& surfels);
 
-/// As above; a PLY file also keeps what has been seen.
+/// As above; a PLY file also keeps what has been seen and the kept views, a PCD file the surfels alone.
 void write_map(const std::string& path, const SavedMap& map);
 
 /// Reads a whole map. What has been seen is empty where the file does not have it. @throws FileError

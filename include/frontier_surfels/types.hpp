@@ -109,14 +109,14 @@ struct Changes {
 };
 
 /// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size
-/// [m], block (x, y, z) with its lowest corner at (x, y, z) block_size; points are counted along a block's edge.
+/// [m], block (x, y, z) with its lowest corner at (x, y, z) block_size.
 struct SeenSpace {
   struct Block {
     std::array<std::int32_t, 3> block = {0, 0, 0};  ///< x, y, z
-    std::vector<std::uint8_t> bytes;                ///< see src/map/seen_points.hpp
+    std::vector<std::uint8_t> bytes;                ///< see src/map/seen_block.hpp
   };
   double block_size = 0;  ///< [m]
-  int points = 0;         ///< of a block along an edge; 0: nothing is known of what has been seen
+  int points = 0;         ///< along each edge of a block, a power of two from 16 to 256; 0: what has been seen is not known
   std::vector<Block> blocks;
 };
 
@@ -131,7 +131,7 @@ struct SavedView {
 /// A whole map, as files keep it.
 struct SavedMap {
   std::vector<Surfel> surfels;
-  SeenSpace seen;                ///< by views that are no longer kept
+  SeenSpace seen;                ///< what the views that are no longer kept have seen
   std::vector<SavedView> views;  ///< the kept ones, oldest first
 };
 

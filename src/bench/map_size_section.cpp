@@ -1,6 +1,5 @@
 /// Section "map_size": the same frames in maps of 1 to 50 million surfels, which are the mapped room and copies of it side by side. A
-/// loaded map has no recent views, so that every frame must ask the surfels what is known: this is what a large map costs after views have
-/// been forgotten.
+/// loaded map has no kept views at first, and what has been seen is filled in.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -44,14 +44,14 @@ std::string header(const Sizes& sizes) {
   char line[160];
   std::snprintf(line, sizeof line, "ply\nformat binary_little_endian 1.0\ncomment frontier_surfels 1 crc32 %08" PRIx32 "\n", sizes.crc);
   std::string text = line;
-  if (sizes.points > 0)
+  if (sizes.bytes > 0 || sizes.points > 0)
     text += "comment seen " + std::to_string(sizes.points) + " points " + text_of(sizes.block_size) + " m " + std::to_string(sizes.blocks) +
             " blocks " + std::to_string(sizes.views) + " views\n";
   text += "element vertex " + std::to_string(sizes.surfels) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"}) text += std::string("property float ") + name + "\n";
   for (const char* name : {"red", "green", "blue", "label"}) text += std::string("property uchar ") + name + "\n";
   // Bytes one by one, because MeshLab loses its place in an element that has lists.
-  if (sizes.points > 0) text += "element seen " + std::to_string(sizes.bytes) + "\nproperty uchar byte\n";
+  if (sizes.bytes > 0 || sizes.points > 0) text += "element seen " + std::to_string(sizes.bytes) + "\nproperty uchar byte\n";
   return text + kHeaderEnd;
 }
 
@@ -203,7 +203,7 @@ SavedMap read_saved_ply(const std::string& path) {
   if (text != header(sizes))
     throw FileError(path + " is a PLY file of another layout than a saved map: give a file that was saved by this library.");
   const std::uint64_t size = file.body_bytes(text.size()), of_surfels = sizes.surfels * sizeof(Record);
-  const bool fits = size / sizeof(Record) >= sizes.surfels && size - of_surfels == (sizes.points > 0 ? sizes.bytes : 0);
+  const bool fits = size / sizeof(Record) >= sizes.surfels && size - of_surfels == sizes.bytes;
   if (!fits) throw cut_off(path, sizes);
   const std::vector<std::uint8_t> body = file.body(text.size());
   if (checksum(body.data(), body.size()) != sizes.crc)

@@ -11,7 +11,7 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr int kMostShift = 6;  // 64 bricks, hence 1024 points, along a block's edge
+constexpr int kMostShift = 4;  // 16 bricks, hence 256 points, along a block's edge: a block's table takes 16 kB
 constexpr std::size_t kGroup = 64;
 }  // namespace
 
@@ -20,7 +20,7 @@ void SeenPoints::check(const SeenSpace& seen) {
   while (shift < kMostShift && SEEN_BRICK << shift < seen.points) ++shift;
   if (seen.points != SEEN_BRICK << shift)
     throw FileError("What has been seen has " + std::to_string(seen.points) +
-                    " points along a block's edge, which is no power of two from 16 to 1024: use another copy of the map.");
+                    " points along a block's edge, which is no power of two from 16 to 256: use another copy of the map.");
   for (const SeenSpace::Block& block : seen.blocks) check_seen_block(block.bytes, std::size_t{1} << (3 * shift));
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
 #include <unordered_map>
 #include <utility>
@@ -16,8 +17,13 @@
 
 namespace frontier_surfels {
 
-/// Distance of the points, unless a parameter says otherwise [edge of the smallest voxels].
-constexpr double kSeenSpacing = 2.5;
+constexpr double kSeenSpacing = 2.5;  ///< distance of the points [edge of a voxel]
+
+/// Distance of the points, unless a parameter says otherwise [m]: by the voxels at z_min, or at a sixth of z_max if that is farther. By
+/// very near voxels, which are small, the points would need more memory and time than the map.
+inline double default_seen_spacing(const Grid& grid) {
+  return kSeenSpacing * grid.delta_min * std::max(1.0F, grid.z_max / (6 * grid.z_min));
+}
 
 /// What is remembered of a block, as SeenPoints::read_blocks() gives it.
 using SeenBlock = StoredBlock;
@@ -30,7 +36,7 @@ class SeenPoints {
   SeenPoints(Commands& commands, double block_size);
 
   /// Chooses the lattice, unless choose_shift() has, or something has been remembered: the distance of its points becomes a block's edge
-  /// divided by a power of two, and at most `spacing` [m], but at least 1 / 1024 of the edge.
+  /// divided by a power of two, and at most `spacing` [m], but at least 1 / 256 of the edge.
   void choose_spacing(double spacing);
   void choose_shift(int shift);  ///< chooses the lattice of a saved map until clear(); nothing may be remembered
   static int shift_for_spacing(double block_size, double spacing);

@@ -15,14 +15,19 @@ struct Head {
 };
 static_assert(sizeof(Head) == 17 * 8 + 2 * 4);
 
-bool is_sound(const SavedView& view, const Head& head) {
-  const Eigen::Matrix3d R = view.T_world_camera.linear();
-  return std::all_of(head.numbers.begin(), head.numbers.end(), [](double x) { return std::isfinite(x); }) &&
-         (R * R.transpose()).isIdentity(1e-6) && head.width > 0 && head.height > 0 && view.depth_step > 0 && view.intrinsics.fx > 0 &&
-         view.intrinsics.fy > 0 && view.depth.size() == static_cast<std::uint64_t>(head.width) * static_cast<std::uint64_t>(head.height);
-}
-
 }  // namespace
+
+void check_view(const SavedView& view) {
+  const Intrinsics& camera = view.intrinsics;
+  const Eigen::Matrix3d R = view.T_world_camera.linear();
+  const double positive[] = {camera.fx, camera.fy, view.depth_step};
+  const bool is_sound = view.T_world_camera.matrix().allFinite() && (R * R.transpose()).isIdentity(1e-6) && std::isfinite(camera.cx) &&
+                        std::isfinite(camera.cy) &&
+                        std::all_of(std::begin(positive), std::end(positive), [](double x) { return std::isfinite(x) && x > 0; }) &&
+                        camera.width > 0 && camera.height > 0 &&
+                        view.depth.size() == static_cast<std::uint64_t>(camera.width) * static_cast<std::uint64_t>(camera.height);
+  if (!is_sound) throw FileError("A kept view of the map has no camera, pose or depths: use another copy.");
+}
 
 std::vector<std::uint8_t> pack_view(const SavedView& view) {
   Head head = {};
@@ -56,7 +61,7 @@ SavedView unpack_view(const std::uint8_t* bytes, std::size_t size, std::size_t* 
   view.depth_step = head.numbers[16];
   view.depth.resize(count);
   if (count > 0) std::memcpy(view.depth.data(), bytes + sizeof head + sizeof count, count * sizeof(std::uint16_t));
-  if (!is_sound(view, head)) throw FileError("A kept view of the map has no camera, pose or depths: use another copy.");
+  check_view(view);
   *used = sizeof head + sizeof count + count * sizeof(std::uint16_t);
   return view;
 }

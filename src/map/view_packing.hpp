@@ -13,6 +13,9 @@ namespace frontier_surfels {
 /// step of the depths. Width and height (int32), the number of depths (uint32) and the depths (uint16) follow.
 constexpr std::size_t kViewNumbers = 17;
 
+/// @throws FileError  the view has no camera, pose or depths
+void check_view(const SavedView& view);
+
 std::vector<std::uint8_t> pack_view(const SavedView& view);
 
 /// @param used  [out] number of bytes that the view takes

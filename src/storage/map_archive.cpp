@@ -35,6 +35,7 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, c
       seen_(seen),
       views_(views),
       complete_(std::move(complete)),
+      stores_views_(config.seen_points),
       radius_(config.eviction_radius),
       folder_(config.map_folder, map.block_size()) {
   for (const BlockKey& key : folder_.keys()) {
@@ -53,12 +54,14 @@ MapArchive::~MapArchive() {
   }
 }
 
-/// The lattice is that of the blocks in the folder. One that can be read is enough.
+/// The lattice is that of the seen points in the folder. One block that can be read is enough; those without seen points may have been
+/// stored before the lattice was chosen.
 void MapArchive::choose_lattice() {
   for (const auto& [region, blocks] : stored_)
     for (const BlockKey& block : blocks) {
       try {
-        return seen_.choose_shift(parts_of(folder_.read(block)).shift);
+        const StoredParts parts = parts_of(folder_.read(block));
+        if (!parts.seen.empty()) return seen_.choose_shift(parts.shift);
       } catch (const FileError&) {  // frames that need the block will tell
       }
     }
@@ -240,6 +243,7 @@ std::vector<std::uint8_t> MapArchive::united(const std::vector<std::uint8_t>& se
 
 /// Adds the views that are kept but not on disk, and erases those on disk that are no longer kept.
 void MapArchive::add_views(std::vector<StoredBlock>& stored) const {
+  if (!stores_views_) return;
   const std::vector<std::uint64_t> numbers = views_.numbers();
   const std::set<std::uint64_t> kept(numbers.begin(), numbers.end());
   for (const std::set<std::uint64_t>* on_disk : {&old_views_, &saved_views_})
@@ -251,6 +255,7 @@ void MapArchive::add_views(std::vector<StoredBlock>& stored) const {
 
 std::vector<SavedView> MapArchive::stored_views() const {
   std::vector<SavedView> views;
+  if (!stores_views_) return views;
   for (const std::uint64_t number : old_views_) {
     const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
     std::size_t used = 0;

@@ -87,7 +87,8 @@ class MapArchive {
   SeenPoints& seen_;
   const RecentViews& views_;
   const std::function<Blocks()> complete_;
-  const double radius_;  ///< [m]
+  const bool stores_views_;  ///< without seen points they are of no use, and those in the folder stay there
+  const double radius_;      ///< [m]
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
   std::size_t stored_surfels_ = 0;               ///< in these blocks
