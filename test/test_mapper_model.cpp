@@ -156,6 +156,18 @@ class MapperModel : public testing::Test {
   }
 
   /// With a map folder: what is found there by the next mapper is the map.
+  void take_any_steps(const Config& config) {
+    const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
+    begin(config);
+    for (const Step& step : steps) take(step);
+  }
+
+  Config with_folder(Config config) const {
+    config.eviction_radius = 9;
+    config.map_folder = (folder_ / "map").string();
+    return config;
+  }
+
   void reopen() {
     mapper_.reset();
     mapper_ = std::make_unique<Mapper>(config_);
@@ -292,35 +304,17 @@ Config few_views() {
   return config;
 }
 
-RC_GTEST_FIXTURE_PROP(MapperModel, InMemory, ()) {
-  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
-  begin(undecimated());
-  for (const Step& step : steps) take(step);
-}
+RC_GTEST_FIXTURE_PROP(MapperModel, InMemory, ()) { take_any_steps(undecimated()); }
 
-RC_GTEST_FIXTURE_PROP(MapperModel, InMemoryWithFewViews, ()) {
-  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
-  begin(few_views());
-  for (const Step& step : steps) take(step);
-}
+RC_GTEST_FIXTURE_PROP(MapperModel, InMemoryWithFewViews, ()) { take_any_steps(few_views()); }
 
 RC_GTEST_FIXTURE_PROP(MapperModel, WithAMapFolder, ()) {
-  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
-  Config config = undecimated();
-  config.eviction_radius = 9;
-  config.map_folder = (folder_ / "map").string();
-  begin(config);
-  for (const Step& step : steps) take(step);
+  take_any_steps(with_folder(undecimated()));
   reopen();
 }
 
 RC_GTEST_FIXTURE_PROP(MapperModel, WithAMapFolderAndFewViews, ()) {
-  const auto steps = *rc::gen::container<std::vector<Step>>(any_step());
-  Config config = few_views();
-  config.eviction_radius = 9;
-  config.map_folder = (folder_ / "map").string();
-  begin(config);
-  for (const Step& step : steps) take(step);
+  take_any_steps(with_folder(few_views()));
   reopen();
 }
 

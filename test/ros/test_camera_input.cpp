@@ -32,7 +32,12 @@ struct TestCamera {
       : input(config_of(tf_timeout), {name + "/image", name + "/camera_info", name + "/color"}, poses,
               {[this] { ++ready; }, [this](const DroppedImage& image) { dropped.push_back(image); }}) {}
 
-  void add(const sensor_msgs::Image& image) { input.add_depth({{boost::make_shared<sensor_msgs::Image>(image), nullptr}, Clock::now()}); }
+  /// @param wait  how much later than now it arrives
+  void add(const sensor_msgs::Image& image, Clock::duration wait = {}) {
+    input.add_depth({{boost::make_shared<sensor_msgs::Image>(image), nullptr}, Clock::now() + wait});
+  }
+
+  void add_color(const sensor_msgs::Image& image) { input.add_color({boost::make_shared<sensor_msgs::Image>(image), nullptr}); }
 
   void add_info(const sensor_msgs::CameraInfo& info) { input.add_info(boost::make_shared<sensor_msgs::CameraInfo>(info)); }
 
@@ -65,7 +70,7 @@ class CameraInputs : public testing::Test {
 TEST_F(CameraInputs, TheMapperReadsTheMessagesOwnBytes) {
   TestCamera camera(poses_, "left");
   camera.add_info(info_message(10));
-  camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color_message(10, "rgb8", {1, 2, 3})), nullptr});
+  camera.add_color(color_message(10, "rgb8", {1, 2, 3}));
   camera.add(image_of("left", 10));
   EXPECT_EQ(camera.ready, 1);
   EXPECT_EQ(camera.input.next_stamp(), ros::Time(10));
@@ -89,8 +94,7 @@ TEST_F(CameraInputs, SayWhyColourIsNotUsed) {
   sensor_msgs::Image larger = color_message(10, "rgb8", {1, 2, 3}), unknown = color_message(11, "rgb9", {1, 2, 3});
   larger.height *= 2;
   larger.data.insert(larger.data.end(), larger.data.begin(), larger.data.end());
-  for (const sensor_msgs::Image& color : {larger, unknown, color_message(12, "rgb8", {1, 2, 3})})
-    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color), nullptr});
+  for (const sensor_msgs::Image& color : {larger, unknown, color_message(12, "rgb8", {1, 2, 3})}) camera.add_color(color);
   std::string faults[3];
   for (std::string& fault : faults) {
     camera.add(image_of("left", 10.0 + static_cast<double>(&fault - faults)));
@@ -215,9 +219,8 @@ TEST_F(CameraInputs, LeaveOutColourWhoseStampCannotBeATime) {
   camera.add_info(info_message(10));
   sensor_msgs::Image timeless = color_message(10, "rgb8", {1, 2, 3});
   timeless.header.stamp = ros::TIME_MAX;
-  for (const sensor_msgs::Image& color : {color_message(9.9, "rgb8", {1, 2, 3}), timeless})
-    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color), nullptr});
-  camera.input.add_depth({{boost::make_shared<sensor_msgs::Image>(image_of("left", 10)), nullptr}, Clock::now() + std::chrono::hours(1)});
+  for (const sensor_msgs::Image& color : {color_message(9.9, "rgb8", {1, 2, 3}), timeless}) camera.add_color(color);
+  camera.add(image_of("left", 10), std::chrono::hours(1));
   EXPECT_EQ(camera.ready, 0) << "colour of this time may still come";
 }
 
@@ -247,14 +250,10 @@ TEST_F(CameraInputs, UseACameraInfoWhoseStampCannotBeATimeOnlyWhileThereIsNone) 
 TEST_F(CameraInputs, WaitForColourThatIsDue) {
   TestCamera camera(poses_, "left");
   camera.add_info(info_message(10));
-  const auto add_color = [&](double stamp) {
-    camera.input.add_color({boost::make_shared<sensor_msgs::Image>(color_message(stamp, "rgb8", {1, 2, 3})), nullptr});
-  };
-  add_color(9.9);
-  sensor_msgs::Image late = image_of("left", 10);
-  camera.input.add_depth({{boost::make_shared<sensor_msgs::Image>(late), nullptr}, Clock::now() + std::chrono::hours(1)});
+  camera.add_color(color_message(9.9, "rgb8", {1, 2, 3}));
+  camera.add(image_of("left", 10), std::chrono::hours(1));
   EXPECT_EQ(camera.ready, 0) << "colour was received lately, but not up to this stamp";
-  add_color(10.01);
+  camera.add_color(color_message(10.01, "rgb8", {1, 2, 3}));
   camera.input.look_through();
   ASSERT_EQ(camera.ready, 1);
   EXPECT_EQ(camera.input.take()->color.header().stamp, ros::Time(10.01));
