@@ -4,6 +4,8 @@
 #include <fstream>
 #include <limits>
 
+#include "replay/run.hpp"
+#include "replay/warnings.hpp"
 #include "ros/bag_input.hpp"
 
 namespace frontier_surfels::replay {
@@ -12,6 +14,13 @@ namespace {
 testing::AssertionResult says(const std::string& sentence, const std::string& part) {
   if (sentence.find(part) != std::string::npos) return testing::AssertionSuccess();
   return testing::AssertionFailure() << "'" << part << "' is not in '" << sentence << "'";
+}
+
+/// The warnings of a report about a run with the frames of this source.
+std::vector<std::string> reported(const FrameSource& source) {
+  Run run;
+  finish_run(source, run);
+  return warnings(run);
 }
 
 TEST_F(BagTest, InterpolatesPosesAndPassesOverWhereThereAreNone) {
@@ -178,7 +187,7 @@ TEST_F(BagTest, DistortionWithoutPIsToldOnce) {
         .add("/depth/image", 10.5, depth_message(10.5));
     const auto source = open_source(path_);
     EXPECT_EQ(read_all(*source).size(), 2u);
-    const auto warnings = source->warnings();
+    const std::vector<std::string> warnings = reported(*source);
     ASSERT_EQ(warnings.size(), distorts ? 1u : 0u);
     for (const std::string& warning : warnings)
       EXPECT_TRUE(says(warning, "taken as rectified, with K. If they are not, choose with --depth-topic"));
@@ -201,8 +210,9 @@ TEST_F(BagTest, AlternatingSizesAreToldOnce) {
   bag.close();
   const auto source = open_source(path_);
   EXPECT_EQ(read_all(*source).size(), 8u);
-  ASSERT_EQ(source->warnings().size(), 1u);
-  EXPECT_TRUE(says(source->warnings()[0], "4x3 and of 4x2 pixels alternate: do two cameras publish on the topic? Choose the topics"));
+  const std::vector<std::string> warnings = reported(*source);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(says(warnings[0], "4x3 and of 4x2 pixels alternate: do two cameras publish on the topic? Choose the topics"));
 }
 
 TEST_F(BagTest, AStillCameraGetsAListOfTheTransforms) {
