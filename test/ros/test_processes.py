@@ -19,7 +19,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from mapper_client import TIMEOUT, CameraTopics, Mapper, has_color, run, wait_until
-from synthetic_camera import Camera, compressed_depth, pose, transform
+from synthetic_camera import Camera, compressed_depth, pose, raw_image, transform
 
 REMAPPINGS = ['depth/image:=camera/depth/image_rect', 'depth/camera_info:=camera/depth/camera_info',
               'color/image:=camera/color/image']
@@ -70,7 +70,7 @@ class Processes(unittest.TestCase):
         self.fail('No surfel has a colour.')
 
     def test_transforms_that_cannot_be_used(self):
-        """They end nothing, and one line is printed about them, not two by tf for each."""
+        """They end nothing, and one line is printed about each kind of fault, not two by tf for each transform."""
         camera, mapper = CameraTopics(), Mapper('unmoved')
         process = self.start('unmoved')
         mapper.wait_until_connected(*camera.raw())
@@ -87,8 +87,23 @@ class Processes(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         output = process.communicate(timeout=TIMEOUT)[0]
         self.assertEqual(process.returncode, 0, output)
-        self.assertEqual(len(re.findall('A transform.*is not used.*stamp of 4294967295.*test_processes', output)), 1, output)
+        for fault in ('stamp of 4294967295', 'its child_frame_id is empty', 'its frame_id is empty', 'both its frames are the same'):
+            self.assertEqual(len(re.findall(f'A transform.*is not used.*{fault}.*test_processes', output)), 1, output)
         self.assertLess(len(output.splitlines()), 10, output)
+
+    def test_one_reason_of_dropped_images_hides_no_other(self):
+        camera, mapper = CameraTopics(), Mapper('dropping')
+        process = self.start('dropping')
+        mapper.wait_until_connected(*camera.raw())
+        encodings = ('rgb8', 'no_such_encoding')
+        for encoding in encodings:
+            report = mapper.report(camera.send(0, message=raw_image(camera.camera.depth(0), encoding, None)))
+            self.assertEqual(report.result, FrameReport.DROPPED_BAD_IMAGE, report.reason)
+        process.send_signal(signal.SIGINT)
+        output = process.communicate(timeout=TIMEOUT)[0]
+        self.assertEqual(process.returncode, 0, output)
+        for encoding in encodings:
+            self.assertRegex(output, rf"'{encoding}'.*\(1 depth image dropped\)")
 
     def test_unknown_parameters_are_warned_of(self):
         process = self.start('warned', z_maximum=4.0, decimatoin=2)
