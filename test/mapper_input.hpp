@@ -14,6 +14,7 @@
 
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/scoring/exact_test.hpp"
+#include "same_surfels.hpp"
 #include "synthetic/synthetic_room.hpp"
 
 namespace frontier_surfels {
@@ -116,20 +117,6 @@ inline std::string text(const scoring::ExactScore& s, std::size_t surfels) {
                 "%zu surfels: right %.4f buried %.4f within_2v %.4f fdr_2cm %.4f fdr_5cm %.5f miss_2cm %.5f miss_5cm %.5f label_ok %.4f",
                 surfels, s.right, s.buried, s.within_2v, s.fdr_2cm, s.fdr_5cm, s.miss_2cm, s.miss_5cm, s.label_ok);
   return line;
-}
-
-/// Are all fields equal bit by bit?
-inline bool same(const Surfel& a, const Surfel& b) {
-  return std::memcmp(a.position.data(), b.position.data(), 3 * sizeof(float)) == 0 &&
-         std::memcmp(a.normal.data(), b.normal.data(), 3 * sizeof(float)) == 0 && std::memcmp(&a.radius, &b.radius, sizeof(float)) == 0 &&
-         a.label == b.label && a.rgb == b.rgb && a.id == b.id;
-}
-
-inline testing::AssertionResult same(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
-  if (a.size() != b.size()) return testing::AssertionFailure() << a.size() << " surfels against " << b.size();
-  for (std::size_t n = 0; n < a.size(); ++n)
-    if (!same(a[n], b[n])) return testing::AssertionFailure() << "surfel " << n << " of " << a.size() << " differs";
-  return testing::AssertionSuccess();
 }
 
 /// Is the same remembered, point by point, and are the same views kept?

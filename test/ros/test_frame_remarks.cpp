@@ -76,6 +76,7 @@ TEST_F(Remarks, FarDepthsThatCarveAreToldOnceIfNothingElseComes) {
   const auto on_next = [&](int millimetres) { return about(carving, static_cast<std::uint16_t>(millimetres), 8, x += 0.01); };
   for (int n = 1; n < FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "") << n;
   EXPECT_TRUE(says(on_next(20000), "None of the measured depths are from z_min"));
+  ASSERT_EQ(warned_.size(), 1U);
   EXPECT_TRUE(says(warned_.back(), "correct depth_unit"));
   for (int n = 0; n < 2 * FrameRemarks::kFarFrames; ++n) ASSERT_EQ(on_next(20000), "");
   EXPECT_EQ(warned_.size(), 1U);

@@ -11,12 +11,12 @@
 #include <map>
 #include <thread>
 
-#include "mapper_input.hpp"
 #include "ros/client/map_subscriber.hpp"
 #include "ros/master_input.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/surfel_input.hpp"
 #include "ros/worker.hpp"
+#include "same_surfels.hpp"
 
 namespace frontier_surfels {
 namespace {
