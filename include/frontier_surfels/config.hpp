@@ -97,7 +97,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"carve_beyond_range", "", "whether a depth beyond z_max means that space is free up to z_max"},
         config.carve_beyond_range);
 
-  group = "Known space from the surfels, if seen_points is false";
+  group = "Known space from the surfels, once a view was forgotten and if seen_points is false";
   field(FieldInfo{"th_d", "", "a surfel counts on a path if the cosine between its normal and the path is larger than this", 0, 0.99},
         config.th_d);
   field(FieldInfo{"peak", "", "extremes of the sign field smaller than this do not count", 0.01, 10}, config.peak);

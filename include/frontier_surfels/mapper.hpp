@@ -56,8 +56,9 @@ class Mapper {
   /// The whole map as files keep it, with what has been seen; with a map_folder, also what is on disk. @throws FileError
   SavedMap saved_map() const;
 
-  /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. With
-  /// a map_folder, the file has the whole map, which must fit into memory while it is written. @throws FileError
+  /// Writes the map as a PLY or PCD file, by the ending of the path (map_file.hpp): first to a temporary file, which is then renamed. A PCD
+  /// file has the surfels alone, without what has been seen and the kept views. With a map_folder, the file has the whole map, which must
+  /// fit into memory while it is written. @throws FileError
   void save(const std::string& path) const;
 
   /// With a map_folder, waits until the whole map is written to it; without one, does nothing. To be called before the mapper is destroyed:

@@ -109,11 +109,13 @@ struct Changes {
 };
 
 /// What has been seen of the world, as it is saved with a map: a lattice of points, with a bit for each. Blocks are cubes of block_size
-/// [m], block (x, y, z) with its lowest corner at (x, y, z) block_size.
+/// [m], block (x, y, z) with its lowest corner at (x, y, z) block_size. A brick is a cube of 16^3 points.
 struct SeenSpace {
   struct Block {
     std::array<std::int32_t, 3> block = {0, 0, 0};  ///< x, y, z
-    std::vector<std::uint8_t> bytes;                ///< see src/map/seen_block.hpp
+    /// A byte for each brick, x running fastest: 0 no point of it is seen, 1 some are, 2 all are. Then, for each brick of some, 64 words of
+    /// 64 bits (little endian) for cubes of 4^3 points, again with x running fastest, also within a word. None: no point is seen.
+    std::vector<std::uint8_t> bytes;
   };
   double block_size = 0;  ///< [m]
   int points = 0;         ///< along each edge of a block, a power of two from 16 to 256; 0: what has been seen is not known
@@ -131,7 +133,7 @@ struct SavedView {
 /// A whole map, as files keep it.
 struct SavedMap {
   std::vector<Surfel> surfels;
-  SeenSpace seen;                ///< what the views that are no longer kept have seen
+  SeenSpace seen;                ///< what forgotten views have seen: those that are not kept
   std::vector<SavedView> views;  ///< the kept ones, oldest first
 };
 
@@ -153,7 +155,7 @@ struct Report {
   std::size_t map_bytes = 0;  ///< memory of the surfels and of their index, with free pages, and with spare capacity on devices that have
                               ///< memory of their own
   std::size_t device_bytes = 0;   ///< all buffers on the device, with the map's; without memory that a CPU's system has not provided yet
-  std::size_t seen_bytes = 0;     ///< memory of what views have seen that are no longer kept
+  std::size_t seen_bytes = 0;     ///< seen points: memory of what forgotten views have seen [byte]
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
   std::vector<StageTime> stages;  ///< device time of each stage, in running order, by OpenCL events

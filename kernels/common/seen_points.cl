@@ -1,4 +1,4 @@
-// Seen points: memory of what views that are no longer kept have seen. The world has a lattice of points, with a bit each: has such a view
+// Seen points: memory of what forgotten views have seen. The world has a lattice of points, with a bit each: has such a view
 // seen this very point?
 //
 // A block of the map has 2^seen_shift bricks along each edge. A brick has SEEN_BRICK^3 points in SEEN_WORDS words of 4 x 4 x 4 points.

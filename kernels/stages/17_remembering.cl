@@ -1,5 +1,5 @@
-// Remembering: what a view has seen that will no longer be kept becomes seen points (common/seen_points.cl) - ours. The points of the
-// lattice that the view knows are set, exactly those: the shortcuts for whole bricks decide only how long it takes.
+// Remembering: what a view has seen that is not kept, or is forgotten, becomes seen points (common/seen_points.cl) - ours. The points of
+// the lattice that the view knows are set, exactly those: the shortcuts for whole bricks decide only how long it takes.
 
 // Does a view know every point in a rectangle of its image up to the depth `far`?
 //   pixels: first column and row, last column and row

@@ -1,4 +1,4 @@
-/// Seen points, our addition to the paper: memory of what views that are no longer kept have seen. kernels/common/seen_points.cl describes
+/// Seen points, our addition to the paper: memory of what forgotten views have seen. kernels/common/seen_points.cl describes
 /// the buffers: blocks of the map have tables of bricks, and bricks have a bit for each point of the lattice.
 #pragma once
 
