@@ -348,7 +348,7 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
   SurfelMap::check(saved.surfels);
   for (const SavedView& view : saved.views) check_view(view);
-  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size()) : SeenSpace();
+  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size(), config.threads) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there
   views.clear(map.size() == 0);

@@ -80,7 +80,8 @@ class Mapper {
   void load(const std::vector<Surfel>& surfels);
 
   /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in
-  /// from the surfels. @throws FileError  what has been seen is damaged; the map stays as it was
+  /// from the surfels, on `threads` threads of the host. @throws FileError  what has been seen is damaged; the map stays as it was
+  /// @throws Error  there is not enough memory to fill it in; the map stays as it was
   void load(const SavedMap& map);
 
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.
