@@ -1,5 +1,4 @@
 /// Faults of map folders: a killed mapper, a full disk, damaged blocks, unusable folders.
-#include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sys/wait.h>
 
@@ -187,15 +186,43 @@ TEST_F(MapperArchive, ADeletedFolderIsTold) {
   EXPECT_TRUE(contains(said, "has been deleted, moved or replaced")) << said;
 }
 
+/// The other views, and all else, are still there.
+TEST_F(MapperArchive, DamagedViewsAreLeftOutWithAWarning) {
+  const Frames frames = walk_there(6);
+  SavedMap expected;
+  {
+    Mapper mapper(walking(path_));
+    integrate_all(mapper, frames);
+    expected = mapper.saved_map();
+  }
+  const std::string views = " x = " + std::to_string(view_key(0).x), of_view = views + " AND z = (SELECT ";
+  change_file("UPDATE blocks SET crc = ~crc WHERE" + of_view + "min(z) FROM blocks WHERE" + views + ")");
+  change_file("UPDATE blocks SET bytes = substr(bytes, 1, 20) WHERE" + of_view + "max(z) FROM blocks WHERE" + views + ")");
+  ASSERT_EQ(expected.views.size(), 12u);
+  expected.views.erase(expected.views.begin());
+  expected.views.pop_back();
+  {
+    Mapper mapper(walking(path_));
+    const std::vector<std::string> warnings = mapper.take_warnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(contains(warnings[0], "The map folder " + path_ + " has lost 2 of its 12 kept views")) << warnings[0];
+    EXPECT_TRUE(mapper.take_warnings().empty());
+    const SavedMap map = mapper.saved_map();
+    EXPECT_TRUE(same(sorted(map.surfels), sorted(expected.surfels)));
+    EXPECT_TRUE(same_memory(map, expected));
+  }
+  Mapper mapper(walking(path_));
+  EXPECT_TRUE(mapper.take_warnings().empty());
+  EXPECT_TRUE(same_memory(mapper.saved_map(), expected));
+  mapper.integrate(frames.back().view());
+}
+
 /// Some blocks enter memory, then one cannot be read: the frame is refused, and changes() reports the blocks that have entered.
 TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   const Frames there = walk_there(20), all = walk_there_and_back(20);
   Mapper plain(walking()), mapper(walking(path_));
   integrate_all(plain, all);
   Follower follower;
-  const auto change_file = [&](const char* sql) {
-    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec(sql);
-  };
   for (const auto& frame : there) mapper.integrate(frame.view());
   follower.apply(mapper.changes(0));
   std::size_t refused = 0;

@@ -68,6 +68,10 @@ class Mapper {
   /// Why the map folder could not be written at the last try; empty if all is well. Later frames and flush() try again. From any thread.
   std::string map_folder_fault() const;
 
+  /// What is odd about the map that was opened or loaded, but no reason to refuse it, in sentences: damaged kept views that were left out.
+  /// Each sentence is given once.
+  std::vector<std::string> take_warnings();
+
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. With the same configuration, mapping goes on as with
   /// the map that was saved. What has been seen is filled in from the surfels if the file does not have it; PCD files never do.
   /// @throws FileError  the file cannot be used; the map stays as it was

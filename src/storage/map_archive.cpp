@@ -35,8 +35,8 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, c
       seen_(seen),
       views_(views),
       complete_(std::move(complete)),
-      stores_views_(config.seen_points),
       radius_(config.eviction_radius),
+      path_(config.map_folder),
       folder_(config.map_folder, map.block_size()) {
   for (const BlockKey& key : folder_.keys()) {
     if (is_view(key))
@@ -253,14 +253,21 @@ void MapArchive::add_views(std::vector<StoredBlock>& stored) const {
     if (saved_views_.count(number) == 0) stored.push_back({view_key(number), pack_view(views_.saved(number))});
 }
 
-std::vector<SavedView> MapArchive::stored_views() const {
+std::vector<SavedView> MapArchive::stored_views(std::vector<std::string>* warnings) const {
   std::vector<SavedView> views;
-  if (!stores_views_) return views;
   for (const std::uint64_t number : old_views_) {
-    const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
-    std::size_t used = 0;
-    views.push_back(unpack_view(bytes.data(), bytes.size(), &used));
+    try {
+      const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
+      std::size_t used = 0;
+      views.push_back(unpack_view(bytes.data(), bytes.size(), &used));
+    } catch (const FileError&) {  // the map and the other views are worth having
+    }
   }
+  if (const std::size_t damaged = old_views_.size() - views.size(); damaged > 0)
+    warnings->push_back("The map folder " + path_ + " has lost " + std::to_string(damaged) + " of its " +
+                        std::to_string(old_views_.size()) +
+                        " kept views, which cannot be read: what no other view has seen is unknown again; use a copy of the folder, or see "
+                        "it again.");
   return views;
 }
 

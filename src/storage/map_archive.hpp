@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <set>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -47,8 +48,11 @@ class MapArchive {
   /// Writes what has changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
 
-  /// The kept views of an earlier map, oldest first. @throws FileError
-  std::vector<SavedView> stored_views() const;
+  /// The kept views of an earlier map, oldest first. Those that cannot be read are left out. @param warnings  gets a sentence about these
+  std::vector<SavedView> stored_views(std::vector<std::string>* warnings) const;
+
+  /// From now on, the kept views take the place of those of the earlier map.
+  void store_views() { stores_views_ = true; }
 
   /// Adds what is on disk only. @throws FileError
   void add_stored(SavedMap& map) const;
@@ -87,8 +91,9 @@ class MapArchive {
   SeenPoints& seen_;
   const RecentViews& views_;
   const std::function<Blocks()> complete_;
-  const bool stores_views_;  ///< without seen points they are of no use, and those in the folder stay there
-  const double radius_;      ///< [m]
+  bool stores_views_ = false;  ///< else those in the folder stay there
+  const double radius_;        ///< [m]
+  const std::string path_;     ///< of folder_
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
   std::size_t stored_surfels_ = 0;               ///< in these blocks
