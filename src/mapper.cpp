@@ -69,6 +69,7 @@ struct Mapper::Impl {
     views.clear(archive->empty());
     if (!config.seen_points) return;  // the folder's views are of no use then, and stay there
     const std::vector<SavedView> stored = archive->stored_views(&warnings);
+    views.make_room(stored);
     load_views(stored);
     archive->store_views();
   }
@@ -343,6 +344,7 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
   SurfelMap::check(saved.surfels);
   for (const SavedView& view : saved.views) check_view(view);
+  views.make_room(saved.views);
   const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size(), config.threads) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there

@@ -18,7 +18,8 @@ class Mapper {
   /// Chooses the device and builds all kernels.
   /// @throws Error        the configuration has problems; the message lists all of them
   /// @throws DeviceError  no device fits (the message lists all devices), or the kernels do not build
-  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, or has another block size
+  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, has another block size, or
+  ///                      has kept views that are too large for config.recent_views
   explicit Mapper(const Config& config = {});
   ~Mapper();
   Mapper(Mapper&&) noexcept;
@@ -84,7 +85,8 @@ class Mapper {
   void load(const std::vector<Surfel>& surfels);
 
   /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in
-  /// from the surfels, on `threads` threads of the host. @throws FileError  what has been seen is damaged; the map stays as it was
+  /// from the surfels, on `threads` threads of the host. @throws FileError  what has been seen is damaged, or the kept views are too
+  /// large for recent_views; the map stays as it was
   /// @throws Error  there is not enough memory to fill it in; the map stays as it was
   void load(const SavedMap& map);
 
