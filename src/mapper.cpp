@@ -360,14 +360,16 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   archive->save_some(static_cast<std::uint32_t>(sequence));
 }
 
-/// What there is no room for becomes seen points, as if it had been kept and forgotten.
+/// The seen points must be there. What there is no room for becomes seen points, as if it had been kept and forgotten.
 void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
+  if (config.seen_spacing > 0) seen.choose_spacing(config.seen_spacing);
   for (const SavedView& view : saved) {
     views.set_current(working_image_of(view), view.T_world_camera);
     views.keep();
     remember_forgotten();
     commands.forget_times();
   }
+  if (config.seen_points) seen.warn_of_spacing(config.seen_spacing, &warnings);
 }
 
 void Mapper::reset() {

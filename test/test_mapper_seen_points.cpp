@@ -317,6 +317,39 @@ TEST_F(MapperArchive, AFolderWithViewsThatAreTooLargeKeepsThem) {
   EXPECT_TRUE(same_memory(Mapper(config).saved_map(), map));
 }
 
+/// A map keeps its lattice, whatever is asked for later.
+TEST_F(MapperArchive, ASpacingThatTheMapDoesNotHaveIsWarnedOf) {
+  const Frames frames = orbit_frames(coarse_camera(), 3, 5);
+  Config config = few_views(0);
+  Mapper plain(config);
+  integrate_all(plain, frames);
+  const SavedMap map = plain.saved_map();
+  const double spacing = map.seen.block_size / map.seen.points;
+  for (const double asked : {0.0, spacing, 1.9 * spacing, 2 * spacing, 0.9 * spacing}) {
+    SCOPED_TRACE(asked);
+    const bool differs = asked == 2 * spacing || asked == 0.9 * spacing;
+    const auto check = [&](Mapper& mapper) {
+      const std::vector<std::string> warnings = mapper.take_warnings();
+      ASSERT_EQ(warnings.size(), differs ? 1u : 0u);
+      if (differs) {
+        EXPECT_NE(warnings[0].find("seen_spacing is "), std::string::npos) << warnings[0];
+      }
+      EXPECT_TRUE(mapper.take_warnings().empty());
+      EXPECT_EQ(mapper.saved_map().seen.points, map.seen.points);
+    };
+    Config other = config;
+    other.seen_spacing = asked;
+    Mapper loaded(other);
+    EXPECT_TRUE(loaded.take_warnings().empty());
+    loaded.load(map);
+    check(loaded);
+    other.map_folder = (root_ / std::to_string(asked)).string();
+    Mapper(other).load(map);
+    Mapper reopened(other);
+    check(reopened);
+  }
+}
+
 /// Near voxels are small: the points do not become as small as these.
 TEST(MapperSeenPoints, AreNoFinerThanTheVoxelsAtASixthOfTheRange) {
   Config config = few_views(0);

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
 #include "map/seen_block.hpp"
 
@@ -83,6 +84,12 @@ void SeenPoints::choose_shift(int shift) {
   shift_ = std::clamp(shift, 0, kMostShift);
   clear();
   fixed_ = true;
+}
+
+void SeenPoints::warn_of_spacing(double spacing, std::vector<std::string>* warnings) const {
+  if (!fixed_ || spacing == 0 || shift_for_spacing(block_size_, spacing) == shift_) return;
+  warnings->push_back("seen_spacing is " + to_text(spacing) + " m, but this map has remembered what was seen at points " +
+                      to_text(this->spacing()) + " m apart, and goes on with these: set seen_spacing to 0, or begin a new map.");
 }
 
 int SeenPoints::shift_for_spacing(double block_size, double spacing) {
