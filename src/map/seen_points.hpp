@@ -82,7 +82,7 @@ class SeenPoints {
   void load(const SeenSpace& seen);  ///< into an empty memory
   /// @}
 
-  /// Forgets the points in a box of the world [m].
+  /// Forgets the points in a box of the world [m]. With an archive, MapArchive::forget() does it.
   void forget(const Eigen::AlignedBox3d& box);
 
   void clear();
