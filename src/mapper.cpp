@@ -4,12 +4,12 @@
 #include <optional>
 #include <utility>
 
+#include "config/checked.hpp"
 #include "frame/camera.hpp"
 #include "frame/limits.hpp"
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
-#include "frontier_surfels/paths.hpp"
 #include "map/change_readers.hpp"
 #include "map/seen_fill.hpp"
 #include "map/seen_points.hpp"
@@ -32,16 +32,6 @@ namespace frontier_surfels {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-Config checked(const Config& config) {
-  const auto problems = config.problems();
-  std::string all;
-  for (const auto& problem : problems) all += (all.empty() ? "" : "\n") + problem;
-  if (!all.empty()) throw Error(all);
-  Config checked = config;
-  checked.map_folder = absolute_path(config.map_folder);
-  return checked;
-}
 
 /// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
 template <typename Work>
@@ -77,7 +67,11 @@ struct Mapper::Impl {
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
     views.clear(archive->empty());
-    load_views(archive->stored_views());
+    if (!config.seen_points) return;  // the folder's views are of no use then, and stay there
+    const std::vector<SavedView> stored = archive->stored_views(&warnings);
+    views.make_room(stored);
+    load_views(stored);
+    archive->store_views();
   }
 
   void begin_call();
@@ -115,6 +109,7 @@ struct Mapper::Impl {
   Remembering remembering;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
+  std::vector<std::string> warnings;    ///< that have not been taken
   ChangeReaders readers;
   std::uint64_t sequence = 0;
   std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
@@ -325,6 +320,7 @@ void Mapper::flush() {
   });
 }
 
+std::vector<std::string> Mapper::take_warnings() { return std::exchange(impl_->warnings, {}); }
 std::string Mapper::map_folder_fault() const { return impl_->archive ? impl_->archive->fault() : ""; }
 
 void Mapper::load(const std::string& path) {
@@ -348,7 +344,8 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   commands.forget_times();
   SurfelMap::check(saved.surfels);
   for (const SavedView& view : saved.views) check_view(view);
-  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size()) : SeenSpace();
+  views.make_room(saved.views);
+  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size(), config.threads) : SeenSpace();
   map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there
   views.clear(map.size() == 0);
@@ -363,14 +360,16 @@ void Mapper::Impl::begin_map(const SavedMap& saved) {
   archive->save_some(static_cast<std::uint32_t>(sequence));
 }
 
-/// What there is no room for becomes seen points, as if it had been kept and forgotten.
+/// The seen points must be there. What there is no room for becomes seen points, as if it had been kept and forgotten.
 void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
+  if (config.seen_spacing > 0) seen.choose_spacing(config.seen_spacing);
   for (const SavedView& view : saved) {
     views.set_current(working_image_of(view), view.T_world_camera);
     views.keep();
     remember_forgotten();
     commands.forget_times();
   }
+  if (config.seen_points) seen.warn_of_spacing(config.seen_spacing, &warnings);
 }
 
 void Mapper::reset() {

@@ -1,6 +1,7 @@
 /// Walks whose maps do not fit into memory, for the tests of mappers with a map folder.
 #pragma once
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -91,6 +92,11 @@ class MapperArchive : public testing::Test {
       for (const Surfel& surfel : unpack_block(parts_of(folder.read(block)).surfels, block, block_size)) surfels.push_back(surfel);
     }
     return sorted(surfels);
+  }
+
+  /// Changes the folder's file, which nobody else may be using.
+  void change_file(const std::string& sql) const {
+    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec(sql);
   }
 
   std::filesystem::path root_;

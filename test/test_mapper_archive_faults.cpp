@@ -1,5 +1,4 @@
 /// Faults of map folders: a killed mapper, a full disk, damaged blocks, unusable folders.
-#include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sys/wait.h>
 
@@ -20,12 +19,20 @@ constexpr char kFolder[] = "FRONTIER_SURFELS_TEST_FOLDER";  // folder in which t
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
+/// Views are kept for longer than it takes until the next save, and than blocks stay in memory: what is remembered of them goes into blocks
+/// whose surfels have not changed for long.
+Config to_be_killed(const std::string& folder) {
+  Config config = walking(folder);
+  config.recent_views = 30;
+  return config;
+}
+
 /// Child process of the next test: maps at a camera's rate and appends a byte to a file after every frame.
 TEST(MapperArchiveChild, DISABLED_MapsUntilItIsKilled) {
   const char* folder = std::getenv(kFolder);
   if (folder == nullptr) GTEST_SKIP() << "Only for the test that kills it.";
   const int frames_done = open((std::string(folder) + "_frames").c_str(), O_WRONLY | O_CREAT | O_APPEND, 0666);
-  Mapper mapper{walking(folder)};
+  Mapper mapper{to_be_killed(folder)};
   auto next = std::chrono::steady_clock::now();
   for (const auto& frame : walk_there_and_back(30)) {
     std::this_thread::sleep_until(next);
@@ -47,17 +54,29 @@ pid_t start_child(const std::string& folder) {
   _exit(1);
 }
 
+/// Waits until a condition holds, but no longer than a minute.
+template <typename Condition>
+void wait_until(Condition condition) {
+  for (int wait = 0; wait < 240000 && !condition(); ++wait) std::this_thread::sleep_for(std::chrono::microseconds(250));
+}
+
+/// Some are killed between any two frames, others while they write.
 TEST_F(MapperArchive, AfterAKillTheFolderHoldsTheMapOfARecentFrame) {
-  std::vector<std::vector<Surfel>> maps = {{}};  // after each frame; old ones are dropped
-  Mapper mapper(walking());
+  std::vector<SavedMap> maps(1);  // after each frame; old ones are dropped
+  Mapper mapper(to_be_killed(""));
   const Frames frames = walk_there_and_back(30);
+  const std::filesystem::path written = std::filesystem::path(path_) / "map.sqlite-wal";
   std::mt19937 random(5);
-  for (const std::size_t wanted : {5u, 50u, 90u, 140u, 200u}) {
+  for (const std::size_t wanted : {5u, 50u, 75u, 90u, 140u, 200u}) {
     const pid_t child = start_child(path_);
     const std::string frames_done = path_ + "_frames";
     const auto count = [&] { return std::filesystem::exists(frames_done) ? std::filesystem::file_size(frames_done) : 0; };
-    for (int wait = 0; wait < 60000 && count() < wanted; ++wait) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    std::this_thread::sleep_for(std::chrono::microseconds(random() % 20000));
+    wait_until([&] { return count() >= wanted; });
+    const bool writing = wanted % 2 == 0;
+    std::error_code ignored;  // the file may not be there yet
+    const auto before = std::filesystem::last_write_time(written, ignored);
+    if (writing) wait_until([&] { return std::filesystem::last_write_time(written, ignored) != before; });
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % (writing ? 2000 : 20000)));
     kill(child, SIGKILL);
     int status = 0;
     waitpid(child, &status, 0);
@@ -65,19 +84,22 @@ TEST_F(MapperArchive, AfterAKillTheFolderHoldsTheMapOfARecentFrame) {
     const std::size_t last = count();
     ASSERT_GE(last, wanted);
 
-    const std::vector<Surfel> found = stored();
+    Mapper again(to_be_killed(path_));
+    SavedMap found = again.saved_map();
+    found.surfels = sorted(found.surfels);
     while (maps.size() <= last + 1 && maps.size() <= frames.size()) {
       mapper.integrate(frames[maps.size() - 1].view());
-      maps.push_back(mapper.surfels());
+      maps.push_back(mapper.saved_map());
       if (maps.size() > 40) maps[maps.size() - 40] = {};
     }
     std::size_t n = maps.size();
-    while (n > 0 && (found.size() != maps[n - 1].size() || !same(found, sorted(maps[n - 1])))) --n;
+    while (n > 0 && (found.surfels.size() != maps[n - 1].surfels.size() || !same(found.surfels, sorted(maps[n - 1].surfels)))) --n;
     ASSERT_GT(n, 0u) << "killed after frame " << last << ": the folder holds the map of no frame";
+    EXPECT_TRUE(same_memory(found, maps[n - 1])) << "the surfels are those of frame " << n - 1;
     EXPECT_GE(n - 1 + 30, last) << "too many frames are lost";
-    std::cout << "killed after frame " << last << ", the folder holds the map after frame " << n - 1 << "\n";
+    std::cout << "killed after frame " << last << (writing ? " while writing" : "") << ", the folder holds the map after frame " << n - 1
+              << "\n";
 
-    Mapper again(walking(path_));
     EXPECT_NO_THROW(again.integrate(frames[last].view()));
     again.reset();
     std::filesystem::remove(frames_done);
@@ -164,15 +186,43 @@ TEST_F(MapperArchive, ADeletedFolderIsTold) {
   EXPECT_TRUE(contains(said, "has been deleted, moved or replaced")) << said;
 }
 
+/// The other views, and all else, are still there.
+TEST_F(MapperArchive, DamagedViewsAreLeftOutWithAWarning) {
+  const Frames frames = walk_there(6);
+  SavedMap expected;
+  {
+    Mapper mapper(walking(path_));
+    integrate_all(mapper, frames);
+    expected = mapper.saved_map();
+  }
+  const std::string views = " x = " + std::to_string(view_key(0).x), of_view = views + " AND z = (SELECT ";
+  change_file("UPDATE blocks SET crc = ~crc WHERE" + of_view + "min(z) FROM blocks WHERE" + views + ")");
+  change_file("UPDATE blocks SET bytes = substr(bytes, 1, 20) WHERE" + of_view + "max(z) FROM blocks WHERE" + views + ")");
+  ASSERT_EQ(expected.views.size(), 12u);
+  expected.views.erase(expected.views.begin());
+  expected.views.pop_back();
+  {
+    Mapper mapper(walking(path_));
+    const std::vector<std::string> warnings = mapper.take_warnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(contains(warnings[0], "The map folder " + path_ + " has lost 2 of its 12 kept views")) << warnings[0];
+    EXPECT_TRUE(mapper.take_warnings().empty());
+    const SavedMap map = mapper.saved_map();
+    EXPECT_TRUE(same(sorted(map.surfels), sorted(expected.surfels)));
+    EXPECT_TRUE(same_memory(map, expected));
+  }
+  Mapper mapper(walking(path_));
+  EXPECT_TRUE(mapper.take_warnings().empty());
+  EXPECT_TRUE(same_memory(mapper.saved_map(), expected));
+  mapper.integrate(frames.back().view());
+}
+
 /// Some blocks enter memory, then one cannot be read: the frame is refused, and changes() reports the blocks that have entered.
 TEST_F(MapperArchive, ADamagedBlockRefusesFramesThatNeedIt) {
   const Frames there = walk_there(20), all = walk_there_and_back(20);
   Mapper plain(walking()), mapper(walking(path_));
   integrate_all(plain, all);
   Follower follower;
-  const auto change_file = [&](const char* sql) {
-    SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec(sql);
-  };
   for (const auto& frame : there) mapper.integrate(frame.view());
   follower.apply(mapper.changes(0));
   std::size_t refused = 0;

@@ -274,6 +274,82 @@ TEST(MapperSeenPoints, UnsoundViewsAreRefused) {
   refused([](SavedView& view) { view.T_world_camera.translation().x() = std::nan(""); });
 }
 
+/// The map with a further kept view, of 2.8 million pixels: 1024 such views are too many.
+SavedMap with_a_large_view(SavedMap map) {
+  constexpr int kScale = 24;
+  SavedView large = map.views.back();
+  for (double* number : {&large.intrinsics.fx, &large.intrinsics.fy, &large.intrinsics.cx, &large.intrinsics.cy}) *number *= kScale;
+  large.intrinsics.width *= kScale;
+  large.intrinsics.height *= kScale;
+  large.depth.assign(large.depth.size() * kScale * kScale, static_cast<std::uint16_t>(1 / large.depth_step));
+  map.views.push_back(std::move(large));
+  return map;
+}
+
+TEST_F(MapperArchive, ViewsThatAreTooLargeAreRefusedAndTheMapStays) {
+  const Frames frames = orbit_frames(coarse_camera(), 4, 5);
+  Mapper plain(few_views(1024)), mapper(few_views(1024));
+  integrate_all(plain, {frames.begin(), frames.end() - 1});
+  integrate_all(mapper, {frames.begin(), frames.end() - 1});
+  const std::string file = (root_ / "large.ply").string();
+  write_map(file, with_a_large_view(mapper.saved_map()));
+  const std::string said = fault_of<FileError>([&] { mapper.load(file); });
+  EXPECT_NE(said.find(file + " cannot be loaded. The 1024 kept views would have 2.9"), std::string::npos) << said;
+  EXPECT_NE(said.find("lower recent_views."), std::string::npos) << said;
+  EXPECT_TRUE(same(mapper.surfels(), plain.surfels()));
+  EXPECT_TRUE(same_memory(mapper.saved_map(), plain.saved_map()));
+  plain.integrate(frames.back().view());
+  mapper.integrate(frames.back().view());
+  EXPECT_TRUE(same(mapper.surfels(), plain.surfels()));
+}
+
+TEST_F(MapperArchive, AFolderWithViewsThatAreTooLargeKeepsThem) {
+  Config config = few_views(5);
+  Mapper plain(config);
+  integrate_all(plain, orbit_frames(coarse_camera(), 3, 5));
+  const SavedMap map = with_a_large_view(plain.saved_map());
+  config.map_folder = path_;
+  Mapper(config).load(map);
+  Config too_many = config;
+  too_many.recent_views = 1024;
+  const std::string said = fault_of<FileError>([&] { Mapper mapper(too_many); });
+  EXPECT_NE(said.find("lower recent_views."), std::string::npos) << said;
+  EXPECT_TRUE(same_memory(Mapper(config).saved_map(), map));
+}
+
+/// A map keeps its lattice, whatever is asked for later.
+TEST_F(MapperArchive, ASpacingThatTheMapDoesNotHaveIsWarnedOf) {
+  const Frames frames = orbit_frames(coarse_camera(), 3, 5);
+  Config config = few_views(0);
+  Mapper plain(config);
+  integrate_all(plain, frames);
+  const SavedMap map = plain.saved_map();
+  const double spacing = map.seen.block_size / map.seen.points;
+  for (const double asked : {0.0, spacing, 1.9 * spacing, 2 * spacing, 0.9 * spacing}) {
+    SCOPED_TRACE(asked);
+    const bool differs = asked == 2 * spacing || asked == 0.9 * spacing;
+    const auto check = [&](Mapper& mapper) {
+      const std::vector<std::string> warnings = mapper.take_warnings();
+      ASSERT_EQ(warnings.size(), differs ? 1u : 0u);
+      if (differs) {
+        EXPECT_NE(warnings[0].find("seen_spacing is "), std::string::npos) << warnings[0];
+      }
+      EXPECT_TRUE(mapper.take_warnings().empty());
+      EXPECT_EQ(mapper.saved_map().seen.points, map.seen.points);
+    };
+    Config other = config;
+    other.seen_spacing = asked;
+    Mapper loaded(other);
+    EXPECT_TRUE(loaded.take_warnings().empty());
+    loaded.load(map);
+    check(loaded);
+    other.map_folder = (root_ / std::to_string(asked)).string();
+    Mapper(other).load(map);
+    Mapper reopened(other);
+    check(reopened);
+  }
+}
+
 /// Near voxels are small: the points do not become as small as these.
 TEST(MapperSeenPoints, AreNoFinerThanTheVoxelsAtASixthOfTheRange) {
   Config config = few_views(0);

@@ -2,6 +2,9 @@
 /// with the sum over the eight points around it.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
 
 #include "map/seen_block.hpp"
 #include "stages/frame_fixture.hpp"
@@ -9,6 +12,7 @@
 #include "stages/remembering.hpp"
 #include "stages/seen_bits.hpp"
 #include "stages/view_settling.hpp"
+#include "storage/map_archive.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -186,13 +190,13 @@ TEST_F(SeenPointsTest, UnitedBlocksHaveThePointsOfBoth) {
   EXPECT_THROW(united_seen_blocks(of_a, of_b, 4), FileError);
 }
 
-TEST_F(SeenPointsTest, PointsInABoxAreForgotten) {
-  remember(cameras().front(), 3, 0.02, Content::mixed, true);
-  const SeenBits before(fixture_->seen().saved());
-  const Eigen::Vector3d center = T_world_start_ * Eigen::Vector3d(0, 0, 0.4 * camera_.config.z_max);
-  const Eigen::AlignedBox3d box(center - Eigen::Vector3d(0.31, 0.72, 0.5), center + Eigen::Vector3d(0.4, 0.7, 0.33));
-  fixture_->seen().forget(box);
-  const SeenBits after(fixture_->seen().saved());
+/// A box that crosses blocks and bricks.
+Eigen::AlignedBox3d box_around(const Eigen::Vector3d& center) {
+  return {center - Eigen::Vector3d(0.31, 0.72, 0.5), center + Eigen::Vector3d(0.4, 0.7, 0.33)};
+}
+
+/// Expects the points that are seen in `before` and lie outside of the box, and those that are seen in `later`.
+void expect_forgotten(const SeenBits& before, const Eigen::AlignedBox3d& box, const SeenBits& after, const SeenBits& later) {
   const int n = before.points();
   std::size_t forgotten = 0;
   for (const auto& [block, bytes] : before.blocks())
@@ -201,10 +205,70 @@ TEST_F(SeenPointsTest, PointsInABoxAreForgotten) {
         for (int x = block.x * n; x < (block.x + 1) * n; ++x) {
           const Eigen::Vector3d p = (Eigen::Array3d(x, y, z) + 0.5).matrix() * before.spacing();
           if ((p - box.min()).cwiseAbs().minCoeff() < 1e-6 || (p - box.max()).cwiseAbs().minCoeff() < 1e-6) continue;
-          ASSERT_EQ(after.seen(x, y, z), before.seen(x, y, z) && !box.contains(p));
-          forgotten += before.seen(x, y, z) && box.contains(p);
+          ASSERT_EQ(after.seen(x, y, z), (before.seen(x, y, z) && !box.contains(p)) || later.seen(x, y, z));
+          forgotten += before.seen(x, y, z) && !after.seen(x, y, z);
         }
   EXPECT_GT(forgotten, 0u);
+}
+
+TEST_F(SeenPointsTest, PointsInABoxAreForgotten) {
+  remember(cameras().front(), 3, 0.02, Content::mixed, true);
+  const SeenSpace saved = fixture_->seen().saved();
+  const Eigen::AlignedBox3d box = box_around(T_world_start_ * Eigen::Vector3d(0, 0, 0.4 * camera_.config.z_max));
+  fixture_->seen().forget(box);
+  expect_forgotten(SeenBits(saved), box, SeenBits(fixture_->seen().saved()), SeenBits({saved.block_size, saved.points, {}}));
+}
+
+/// Wherever the blocks are: all on disk, or some of them in memory.
+TEST_F(SeenPointsTest, PointsInABoxAreForgottenOnDisk) {
+  for (const double in_memory : {0.0, 1.2}) {
+    SCOPED_TRACE(in_memory);
+    views_.clear();
+    remember(cameras().front(), 3, 0.02, Content::mixed, true);
+    SeenPoints& seen = fixture_->seen();
+    const double block_size = fixture_->map().block_size();
+    const SeenSpace saved = seen.saved();
+    const Eigen::Vector3d far_away = T_world_start_.translation() + Eigen::Vector3d(100, 0, 0);
+    const SeenBits before(saved), nothing({saved.block_size, saved.points, {}});
+    const Eigen::AlignedBox3d box = box_around(T_world_start_ * Eigen::Vector3d(0, 0, 0.4 * camera_.config.z_max));
+    for (const BlockKey& block : seen.blocks()) seen.drop_block(block);
+    remembering_->remember(*fixture_->views().forgotten(), fixture_->views(), block_size, seen);
+    const SeenBits last(seen.saved());  // of the last view alone, which sees a part of the box again
+    seen.load(saved);
+    std::string folder = (std::filesystem::temp_directory_path() / "seen_points_XXXXXX").string();
+    ASSERT_NE(mkdtemp(folder.data()), nullptr);
+    Config config = camera_.config;
+    config.map_folder = folder;
+    config.eviction_radius = in_memory;
+    const auto open = [&] {
+      return std::make_unique<MapArchive>(config, fixture_->map(), seen, fixture_->views(), [] { return std::vector<BlockKey>(); });
+    };
+    const auto all = [&](const MapArchive& archive) {
+      SavedMap map = {{}, seen.saved(), {}};
+      archive.add_stored(map);
+      return SeenBits(map.seen);
+    };
+    {
+      const auto archive = open();
+      archive->note_changed(seen.blocks_with_points());
+      archive->flush(1);
+      archive->follow(far_away, 0, 2);
+      ASSERT_TRUE(seen.empty());
+      if (in_memory > 0) archive->follow(box.center(), 0, 3);
+      EXPECT_EQ(seen.empty(), in_memory == 0);
+      EXPECT_LT(seen.blocks().size(), before.blocks().size());
+      archive->forget(box);
+      expect_forgotten(before, box, all(*archive), nothing);
+      archive->note_changed(remembering_->remember(*fixture_->views().forgotten(), fixture_->views(), block_size, seen));
+      expect_forgotten(before, box, all(*archive), last);
+      archive->flush(4);
+      archive->follow(-far_away, 0, 5);
+      ASSERT_TRUE(seen.empty());
+      expect_forgotten(before, box, all(*archive), last);
+    }
+    expect_forgotten(before, box, all(*open()), last);
+    std::filesystem::remove_all(folder);
+  }
 }
 
 TEST_F(SeenPointsTest, DamagedBlocksAreRefused) {

@@ -117,9 +117,13 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"seen_points", "",
                   "whether what views have seen is remembered when they are no longer kept; false: the paper's known space decides then"},
         config.seen_points);
-  field(FieldInfo{"seen_spacing", "m",
-                  "largest distance of the points that are remembered; 0: 2.5 voxels at z_min, or at z_max / 6 if that is farther", 0, 1},
-        config.seen_spacing);
+  field(
+      FieldInfo{
+          "seen_spacing", "m",
+          "largest distance of the points that are remembered; 0: 2.5 voxels at z_min, or at z_max / 6 if that is farther; a map that "
+          "is loaded or reopened keeps its own",
+          0, 1},
+      config.seen_spacing);
 
   group = "Removal, creation and labels";
   field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);

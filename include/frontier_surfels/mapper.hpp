@@ -18,7 +18,8 @@ class Mapper {
   /// Chooses the device and builds all kernels.
   /// @throws Error        the configuration has problems; the message lists all of them
   /// @throws DeviceError  no device fits (the message lists all devices), or the kernels do not build
-  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, or has another block size
+  /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, has another block size, or
+  ///                      has kept views that are too large for config.recent_views
   explicit Mapper(const Config& config = {});
   ~Mapper();
   Mapper(Mapper&&) noexcept;
@@ -69,6 +70,10 @@ class Mapper {
   /// Why the map folder could not be written at the last try; empty if all is well. Later frames and flush() try again. From any thread.
   std::string map_folder_fault() const;
 
+  /// What is odd about the map that was opened or loaded, but no reason to refuse it, in sentences: damaged kept views that were left out,
+  /// and a seen_spacing that the map does not have. Each sentence is given once.
+  std::vector<std::string> take_warnings();
+
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. With the same configuration, mapping goes on as with
   /// the map that was saved. What has been seen is filled in from the surfels if the file does not have it; PCD files never do.
   /// @throws FileError  the file cannot be used; the map stays as it was
@@ -81,7 +86,9 @@ class Mapper {
   void load(const std::vector<Surfel>& surfels);
 
   /// Replaces the map by a whole saved one. Where it does not have what has been seen, or with blocks of another size, that is filled in
-  /// from the surfels. @throws FileError  what has been seen is damaged; the map stays as it was
+  /// from the surfels, on `threads` threads of the host. @throws FileError  what has been seen is damaged, or the kept views are too
+  /// large for recent_views; the map stays as it was
+  /// @throws Error  there is not enough memory to fill it in; the map stays as it was
   void load(const SavedMap& map);
 
   /// Empties the map, including the one in the map folder. Keeps the configuration; the sequence number goes on.

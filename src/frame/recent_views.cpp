@@ -37,6 +37,14 @@ constexpr int kPatch = PATCH_COLUMNS * PATCH_ROWS;
 
 int patches(int pixels, int side) { return (pixels + side - 1) / side; }
 
+/// Number of elements that an image takes. A room has whole patches: those of the next room must not cross cache lines, and pixels are read
+/// in pairs.
+std::size_t room_for(int width, int height) {
+  const auto count = [&](int columns, int rows) { return static_cast<std::size_t>(patches(width, columns)) * patches(height, rows); };
+  const std::size_t depths = count(PATCH_COLUMNS, PATCH_ROWS) * kPatch, of_blocks = 2 * count(VIEW_BLOCK, VIEW_BLOCK);
+  return (depths + of_blocks + kPatch - 1) / kPatch * kPatch;
+}
+
 /// A view's depths in the kernels' layout: patch by patch, in steps, without signs. Pixels beyond the image's edges are 0.
 std::vector<cl_ushort> by_patches(const WorkingImage& image, float per_step) {
   const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS);
@@ -122,21 +130,33 @@ void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d
                            smallest = find_block_depths(image, [](float a, float b) { return std::min(a, b); });
   for (const float depth : largest) depths.push_back(to_steps(depth, per_step));
   for (const float depth : smallest) depths.push_back(to_steps(depth, per_step));
-  // A room has whole patches: those of the next room must not cross cache lines, and pixels are read in pairs.
-  depths.resize((depths.size() + kPatch - 1) / kPatch * kPatch);
+  depths.resize(room_for(image.intrinsics.width, image.intrinsics.height));
   if (depths.size() > room_size_) enlarge_rooms(depths.size());
   current_ = {image.intrinsics, T_world_camera, free_room(), *std::max_element(largest.begin(), largest.end()), ++last_number_};
   forgotten_.reset();
   depths_.send(std::move(depths), current_.room * room_size_);
 }
 
+void RecentViews::make_room(const std::vector<SavedView>& views) {
+  std::size_t size = 0;
+  for (const SavedView& view : views) size = std::max(size, room_for(view.intrinsics.width, view.intrinsics.height));
+  if (size <= room_size_) return;
+  if (const std::string fault = excess(size); !fault.empty()) throw FileError(fault + "lower recent_views.");
+  enlarge_rooms(size);
+}
+
+/// The begin of a sentence if rooms of this size cannot be had, else empty.
+std::string RecentViews::excess(std::size_t size) const {
+  const double pixels = (config_.recent_views + 1.0) * static_cast<double>(size);
+  if (pixels <= std::numeric_limits<std::int32_t>::max()) return "";  // pixels are numbered with 32 bits
+  return "The " + std::to_string(config_.recent_views) + " kept views would have " + fixed_text(pixels * 1e-9, 6) +
+         " billion pixels, more than 2 billion; ";
+}
+
 /// Makes every room larger; the kept images are copied.
 void RecentViews::enlarge_rooms(std::size_t size) {
   const std::size_t rooms = config_.recent_views + 1;
-  const double pixels = static_cast<double>(rooms) * static_cast<double>(size);
-  if (pixels > std::numeric_limits<std::int32_t>::max())  // pixels are numbered with 32 bits
-    throw BadFrame("The " + std::to_string(config_.recent_views) + " kept views would have " + fixed_text(pixels * 1e-9, 6) +
-                   " billion pixels, more than 2 billion; raise decimation or lower recent_views.");
+  if (const std::string fault = excess(size); !fault.empty()) throw BadFrame(fault + "raise decimation or lower recent_views.");
   std::size_t used = 0;
   for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);
   depths_.widen_rows(rooms, used, room_size_, size);

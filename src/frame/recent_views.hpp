@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/shared.h"
@@ -37,6 +38,11 @@ class RecentViews {
   /// Makes a frame's view the current one and sends its depths to the device. Images may differ in size.
   /// @throws BadFrame  the image is too large for the number of kept views
   void set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
+
+  /// Makes room for saved views, so that set_current() does not need to.
+  /// @throws FileError  they are too large for the number of kept views. @throws DeviceError, cl::Error  the device has no memory for them
+  void make_room(const std::vector<SavedView>& views);
+
   View own_view() const;  ///< the current view, seen from its own camera
 
   /// Sends the kept views to the device, each with its pose relative to the current camera. @return their number
@@ -83,6 +89,7 @@ class RecentViews {
   View to_view(const Kept& kept, const Eigen::Isometry3d& T_view_camera) const;
   bool differs_enough() const;
   void forget(const Kept& view);
+  std::string excess(std::size_t size) const;
   void enlarge_rooms(std::size_t size);
   std::size_t free_room() const;
 

@@ -11,9 +11,8 @@ void SeenBlockBytes::add_points(const std::function<bool(int)>& is_seen) {
   std::vector<std::uint8_t> words(kBrickBytes, 0);
   for (int point = 0; point < SEEN_BRICK * SEEN_BRICK * SEEN_BRICK; ++point) {
     if (!is_seen(point)) continue;
-    const int x = point % SEEN_BRICK, y = point / SEEN_BRICK % SEEN_BRICK, z = point / SEEN_BRICK / SEEN_BRICK;
-    const int word = (z / 4 * 4 + y / 4) * 4 + x / 4, bit = (z % 4 * 4 + y % 4) * 4 + x % 4;
-    words[8 * word + bit / 8] |= static_cast<std::uint8_t>(1 << bit % 8);
+    const int bit = seen_bit(point);
+    words[bit / 8] |= static_cast<std::uint8_t>(1 << bit % 8);
   }
   add_words(words);
 }

@@ -13,12 +13,19 @@ namespace frontier_surfels {
 
 constexpr std::size_t kBrickBytes = SEEN_WORDS * sizeof(std::uint64_t);
 
+/// Number of a point's bit in the bytes of its brick. Points are numbered (z SEEN_BRICK + y) SEEN_BRICK + x.
+inline int seen_bit(int point) {
+  const int x = point % SEEN_BRICK, y = point / SEEN_BRICK % SEEN_BRICK, z = point / SEEN_BRICK / SEEN_BRICK;
+  const int word = (z / 4 * 4 + y / 4) * 4 + x / 4, bit = (z % 4 * 4 + y % 4) * 4 + x % 4;
+  return 64 * word + bit;
+}
+
 /// Makes the bytes of a block brick by brick.
 class SeenBlockBytes {
  public:
   void add_uniform(std::uint8_t state) { states_.push_back(state); }
 
-  /// @param is_seen  of a point, numbered (z SEEN_BRICK + y) SEEN_BRICK + x
+  /// @param is_seen  of a point, by its number
   void add_points(const std::function<bool(int)>& is_seen);
 
   /// @param words  kBrickBytes bytes

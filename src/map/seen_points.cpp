@@ -5,8 +5,10 @@
 #include <cstring>
 #include <utility>
 
+#include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
 #include "map/seen_block.hpp"
+#include "map/seen_box.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -83,6 +85,12 @@ void SeenPoints::choose_shift(int shift) {
   shift_ = std::clamp(shift, 0, kMostShift);
   clear();
   fixed_ = true;
+}
+
+void SeenPoints::warn_of_spacing(double spacing, std::vector<std::string>* warnings) const {
+  if (!fixed_ || spacing == 0 || shift_for_spacing(block_size_, spacing) == shift_) return;
+  warnings->push_back("seen_spacing is " + to_text(spacing) + " m, but this map has remembered what was seen at points " +
+                      to_text(this->spacing()) + " m apart, and goes on with these: set seen_spacing to 0, or begin a new map.");
 }
 
 int SeenPoints::shift_for_spacing(double block_size, double spacing) {
@@ -183,31 +191,22 @@ void SeenPoints::send_entries(const char* stage) {
   changed_places_.clear();
 }
 
-/// Points along an axis between two coordinates [m], counted from the world's origin: first, and one past the last.
-static Eigen::Array2i points_between(double low, double high, double spacing) {
-  return {static_cast<int>(std::ceil(low / spacing - 0.5)), static_cast<int>(std::floor(high / spacing - 0.5)) + 1};
-}
-
 /// The bricks that a box has a part of. Those without a brick of their own get no number. @param whole  gets those that lie in it as a
 /// whole
 std::vector<SeenPoints::PartlyForgotten> SeenPoints::bricks_in(const Eigen::AlignedBox3d& box,
                                                                std::vector<std::pair<int, int>>& whole) const {
-  const int points = SEEN_BRICK << shift_, sides = (1 << shift_) - 1;
-  Eigen::Array<int, 3, 2> range;  // of points
-  for (int axis = 0; axis < 3; ++axis) range.row(axis) = points_between(box.min()[axis], box.max()[axis], spacing()).transpose();
+  const PointRange points = points_in(box, spacing());
   std::vector<PartlyForgotten> partly;
   for (const BlockKey& key : blocks())
     for (int brick = 0; brick < bricks_of_block(); ++brick) {
-      const Eigen::Array3i low = Eigen::Array3i(key.x, key.y, key.z) * points +
-                                 Eigen::Array3i(brick & sides, brick >> shift_ & sides, brick >> 2 * shift_) * SEEN_BRICK;
-      const Eigen::Array3i first = (range.col(0) - low).max(0), last = (range.col(1) - low).min(SEEN_BRICK);
       const int table = table_of_.at(key);
       const cl_int own = entry(table, brick);
-      if ((first >= last).any() || own == SEEN_BRICK_EMPTY) continue;
-      if ((first == 0).all() && (last == SEEN_BRICK).all())
+      const PointRange inside = points.in_brick(key, shift_, brick);
+      if (inside.empty() || own == SEEN_BRICK_EMPTY) continue;
+      if ((inside.first == 0).all() && (inside.end == SEEN_BRICK).all())
         whole.emplace_back(table, brick);
       else
-        partly.push_back({table, brick, own, own == SEEN_BRICK_FULL, first, last});
+        partly.push_back({table, brick, own, own == SEEN_BRICK_FULL, inside.first, inside.end});
     }
   return partly;
 }

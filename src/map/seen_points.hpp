@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -39,6 +40,9 @@ class SeenPoints {
   /// divided by a power of two, and at most `spacing` [m], but at least 1 / 256 of the edge.
   void choose_spacing(double spacing);
   void choose_shift(int shift);  ///< chooses the lattice of a saved map until clear(); nothing may be remembered
+
+  /// Adds a sentence if choose_spacing(spacing) would change the lattice, but the map has it already. @param spacing  0: any will do
+  void warn_of_spacing(double spacing, std::vector<std::string>* warnings) const;
   static int shift_for_spacing(double block_size, double spacing);
   double spacing() const;               ///< distance of the lattice's points [m]
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
@@ -78,7 +82,7 @@ class SeenPoints {
   void load(const SeenSpace& seen);  ///< into an empty memory
   /// @}
 
-  /// Forgets the points in a box of the world [m].
+  /// Forgets the points in a box of the world [m]. With an archive, MapArchive::forget() does it.
   void forget(const Eigen::AlignedBox3d& box);
 
   void clear();

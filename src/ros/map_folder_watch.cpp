@@ -9,6 +9,7 @@
 namespace frontier_surfels {
 
 std::string MapFolderWatch::look(Throttle::Clock::time_point now) {
+  for (const std::string& warning : mapper_.take_warnings()) ROS_WARN("%s", warning.c_str());
   std::string fault = mapper_.map_folder_fault();
   if (!fault.empty() && tries_.is_due(now)) {
     try {

@@ -1,4 +1,4 @@
-/// What the node does about a map folder that cannot be written.
+/// What the node does about a map folder that cannot be written, and about the mapper's warnings.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,8 @@
 
 namespace frontier_surfels {
 
-/// Logs the fault, and tries again every few seconds, also while no frames come. No ROS communication and no clock in it.
+/// Logs the mapper's warnings, and the fault of its folder. Tries to write every few seconds, also while no frames come. No ROS
+/// communication and no clock in it.
 class MapFolderWatch {
  public:
   explicit MapFolderWatch(Mapper& mapper) : mapper_(mapper) {}

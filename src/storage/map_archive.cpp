@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "map/seen_block.hpp"
+#include "map/seen_box.hpp"
 #include "map/surfel_packing.hpp"
 #include "map/view_packing.hpp"
-#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -35,8 +35,8 @@ MapArchive::MapArchive(const Config& config, SurfelMap& map, SeenPoints& seen, c
       seen_(seen),
       views_(views),
       complete_(std::move(complete)),
-      stores_views_(config.seen_points),
       radius_(config.eviction_radius),
+      path_(config.map_folder),
       folder_(config.map_folder, map.block_size()) {
   for (const BlockKey& key : folder_.keys()) {
     if (is_view(key))
@@ -138,7 +138,7 @@ bool MapArchive::fetch(const Eigen::Vector3d& camera, double radius, std::uint32
   std::vector<SeenBlock> seen;
   const std::vector<std::vector<std::uint8_t>> in_memory = seen_.read_blocks(near);
   for (std::size_t n = 0; n < near.size(); ++n) {
-    parts.push_back(parts_of(folder_.read(near[n])));
+    parts.push_back(stored_parts(near[n]));
     seen.push_back({near[n], united(parts[n].seen, in_memory[n])});
   }
   seen_.add_blocks(seen);
@@ -177,6 +177,29 @@ void MapArchive::save_some(std::uint32_t frame) {
   }
 }
 
+/// All blocks of the box are noted before anything is forgotten, and so go to disk together.
+void MapArchive::forget(const Eigen::AlignedBox3d& box) {
+  note_changed(complete_());
+  const auto note = [&](const Blocks& blocks) {
+    for (const BlockKey& block : blocks) {
+      const Eigen::Vector3d low = Eigen::Vector3d(block.x, block.y, block.z) * map_.block_size();
+      if (box.intersects({low, (low.array() + map_.block_size()).matrix()})) noted_.insert(block);
+    }
+  };
+  note(in_memory());
+  for (const auto& [region, blocks] : stored_) note(blocks);
+  seen_.forget(box);
+  forgotten_.push_back(box);
+}
+
+/// A block on disk, without points that have been forgotten since it was written.
+StoredParts MapArchive::stored_parts(const BlockKey& block) const {
+  StoredParts parts = parts_of(folder_.read(block));
+  for (const Eigen::AlignedBox3d& box : forgotten_)
+    parts.seen = without_points(parts.seen, block, seen_.shift(), points_in(box, seen_.spacing()));
+  return parts;
+}
+
 /// Sorted. Blocks that have become empty are among them.
 MapArchive::Blocks MapArchive::unsaved() const {
   const Blocks changed = map_.blocks_changed_since(saved_);
@@ -204,6 +227,7 @@ bool MapArchive::save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t 
 void MapArchive::write(const Blocks& blocks) {
   if (std::vector<StoredBlock> stored = read(blocks); !stored.empty()) folder_.write(std::move(stored));
   noted_.clear();
+  forgotten_.clear();
   old_views_.clear();
   const std::vector<std::uint64_t> kept = views_.numbers();
   saved_views_ = {kept.begin(), kept.end()};
@@ -227,7 +251,7 @@ std::vector<StoredBlock> MapArchive::read(const Blocks& blocks) const {
   for (std::size_t n = 0; n < stored.size(); ++n) {
     StoredParts parts = {seen_.shift(), std::move(stored[n].second), std::move(seen[n])};
     if (is_stored(blocks[n])) {
-      const StoredParts on_disk = parts_of(folder_.read(blocks[n]));
+      const StoredParts on_disk = stored_parts(blocks[n]);
       parts.surfels = on_disk.surfels;
       parts.seen = united(on_disk.seen, parts.seen);
     }
@@ -253,14 +277,21 @@ void MapArchive::add_views(std::vector<StoredBlock>& stored) const {
     if (saved_views_.count(number) == 0) stored.push_back({view_key(number), pack_view(views_.saved(number))});
 }
 
-std::vector<SavedView> MapArchive::stored_views() const {
+std::vector<SavedView> MapArchive::stored_views(std::vector<std::string>* warnings) const {
   std::vector<SavedView> views;
-  if (!stores_views_) return views;
   for (const std::uint64_t number : old_views_) {
-    const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
-    std::size_t used = 0;
-    views.push_back(unpack_view(bytes.data(), bytes.size(), &used));
+    try {
+      const std::vector<std::uint8_t> bytes = folder_.read(view_key(number));
+      std::size_t used = 0;
+      views.push_back(unpack_view(bytes.data(), bytes.size(), &used));
+    } catch (const FileError&) {  // the map and the other views are worth having
+    }
   }
+  if (const std::size_t damaged = old_views_.size() - views.size(); damaged > 0)
+    warnings->push_back("The map folder " + path_ + " has lost " + std::to_string(damaged) + " of its " +
+                        std::to_string(old_views_.size()) +
+                        " kept views, which cannot be read: what no other view has seen is unknown again; use a copy of the folder, or see "
+                        "it again.");
   return views;
 }
 
@@ -271,7 +302,7 @@ void MapArchive::add_stored(SavedMap& map) const {
   std::map<BlockKey, std::vector<std::uint8_t>> seen;
   for (SeenSpace::Block& block : map.seen.blocks) seen[{block.block[0], block.block[1], block.block[2]}] = std::move(block.bytes);
   for (const BlockKey& block : blocks) {
-    const StoredParts parts = parts_of(folder_.read(block));
+    const StoredParts parts = stored_parts(block);
     const std::vector<Surfel> some = unpack_block(parts.surfels, block, map_.block_size());
     map.surfels.insert(map.surfels.end(), some.begin(), some.end());
     if (!parts.seen.empty()) seen[block] = united(parts.seen, seen[block]);
@@ -286,6 +317,7 @@ void MapArchive::clear() {
   stored_surfels_ = 0;
   followed_.reset();
   noted_.clear();
+  forgotten_.clear();
   fault_ = nullptr;
   saved_views_.clear();
   old_views_.clear();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <set>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "storage/map_folder.hpp"
+#include "storage/stored_block.hpp"
 
 namespace frontier_surfels {
 
@@ -44,11 +46,18 @@ class MapArchive {
   /// Notes blocks that have lost surfels, which no page that is left may tell, or in which more has been seen.
   void note_changed(const std::vector<BlockKey>& blocks) { noted_.insert(blocks.begin(), blocks.end()); }
 
+  /// Forgets the seen points in a box of the world [m], in memory and, with the next save, on disk. Kept views still know what they have
+  /// seen there. @throws cl::Error, FileError  only a part is forgotten, in memory: call it again
+  void forget(const Eigen::AlignedBox3d& box);
+
   /// Writes what has changed since the last time, if it is time to. A fault waits for the next frame's follow().
   void save_some(std::uint32_t frame);
 
-  /// The kept views of an earlier map, oldest first. @throws FileError
-  std::vector<SavedView> stored_views() const;
+  /// The kept views of an earlier map, oldest first. Those that cannot be read are left out. @param warnings  gets a sentence about these
+  std::vector<SavedView> stored_views(std::vector<std::string>* warnings) const;
+
+  /// From now on, the kept views take the place of those of the earlier map.
+  void store_views() { stores_views_ = true; }
 
   /// Adds what is on disk only. @throws FileError
   void add_stored(SavedMap& map) const;
@@ -80,6 +89,7 @@ class MapArchive {
   std::vector<StoredBlock> read(const Blocks& blocks) const;
   std::vector<std::uint8_t> united(const std::vector<std::uint8_t>& seen_a, const std::vector<std::uint8_t>& seen_b) const;
   void add_views(std::vector<StoredBlock>& stored) const;
+  StoredParts stored_parts(const BlockKey& block) const;
   void write(const Blocks& blocks);
   bool save(const Blocks& blocks, std::uint32_t mapped, std::uint32_t frame);
 
@@ -87,8 +97,9 @@ class MapArchive {
   SeenPoints& seen_;
   const RecentViews& views_;
   const std::function<Blocks()> complete_;
-  const bool stores_views_;  ///< without seen points they are of no use, and those in the folder stay there
-  const double radius_;      ///< [m]
+  bool stores_views_ = false;  ///< else those in the folder stay there
+  const double radius_;        ///< [m]
+  const std::string path_;     ///< of folder_
   MapFolder folder_;
   std::unordered_map<BlockKey, Blocks> stored_;  ///< on disk only, by region: cubes of kRegion blocks
   std::size_t stored_surfels_ = 0;               ///< in these blocks
@@ -96,6 +107,7 @@ class MapArchive {
   double followed_radius_ = 0;                   ///< and how far around it they are in memory [m]
   std::set<std::uint64_t> saved_views_;          ///< numbers of the views on disk
   std::set<std::uint64_t> old_views_;            ///< of those on disk that an earlier process has kept
+  std::vector<Eigen::AlignedBox3d> forgotten_;   ///< boxes whose points are still on disk [m]
   std::set<BlockKey> noted_;                     ///< since the last save
   std::exception_ptr fault_;                     ///< of a save that failed
   std::uint32_t saved_ = 0;                      ///< frame of the last save

@@ -207,6 +207,28 @@ class Processes(unittest.TestCase):
         Mapper('later').wait_until_connected()
         self.wait_for_surfels('later', surfels)
 
+    def test_a_spacing_that_a_map_does_not_have_is_warned_of(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        camera, mapper = CameraTopics(), Mapper('coarse')
+        process = self.start('coarse', map_folder=folder, recent_views=0)
+        mapper.wait_until_connected(*camera.raw())
+        self.assertEqual(mapper.report(camera.send(0)).result, FrameReport.INTEGRATED)
+        self.check_ends(process)
+        self.wait_for_line(self.start('fine', map_folder=folder, recent_views=0, seen_spacing=0.002), 'WARN.*seen_spacing is 0.002 m, but')
+
+    def wait_for_line(self, process, sentence):
+        """Waits until the process has printed such a line."""
+        watchdog = threading.Timer(TIMEOUT, process.kill)
+        watchdog.start()
+        self.addCleanup(watchdog.cancel)
+        lines = []
+        for line in process.stdout:
+            lines.append(line)
+            if re.search(sentence, line):
+                return
+        self.fail(f'No line with "{sentence}" in: {lines}')
+
     def check_ends(self, process):
         """The process ends on SIGINT, as roslaunch sends it."""
         start = time.monotonic()
