@@ -13,4 +13,7 @@ namespace frontier_surfels::replay {
 /// @return               CV_16UC1 [mm]; 0: no measurement
 cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index);
 
+/// The pose that a tracker with errors would give.
+Eigen::Isometry3d tracked(const Eigen::Isometry3d& T_world_camera, const SensorModel& sensor, int index);
+
 }  // namespace frontier_surfels::replay
