@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,10 @@
 #include "apps/sequence_writer.hpp"
 #include "config/config_text.hpp"
 #include "frontier_surfels/paths.hpp"
+#include "recordings/frame_source.hpp"
 #include "recordings/objects_file.hpp"
 #include "synthetic/synthetic_room.hpp"
+#include "synthetic/synthetic_sensor.hpp"
 
 namespace fs = std::filesystem;
 namespace replay = frontier_surfels::replay;
@@ -26,6 +29,7 @@ constexpr double kLargestRotationNoise = 5;    // [degree]
 
 struct Options {
   std::string output;
+  std::string recording;  ///< that gets the errors instead of the room; empty: none
   int frames = 0;
   int width = 640;
   int height = 480;
@@ -91,25 +95,53 @@ std::string read_pose_noise(const std::string& text, replay::SensorModel& sensor
   return "";
 }
 
-void write_sequence(const Options& options) {
+/// The folder of the recording, and truth/ in it.
+class Output {
+ public:
+  Output(const fs::path& folder, const frontier_surfels::Intrinsics& camera)
+      : folder_(folder), measured_(folder, camera), ideal_(folder / "truth", camera) {}
+
+  void add(replay::SensedFrame frame) {
+    measured_.add(frame.measured);
+    frame.ideal.color.release();
+    ideal_.add(frame.ideal);
+    ++frames_;
+  }
+
+  void close(const std::vector<replay::SceneThing>& things) {
+    measured_.close();
+    ideal_.close();
+    std::vector<frontier_surfels::scoring::SceneObject> objects;
+    for (const replay::SceneThing& thing : things) objects.push_back(thing.object);
+    if (!objects.empty()) replay::write_text(folder_ / "truth" / "objects.json", replay::objects_text(objects));
+    std::printf("%d frames are in %s.\n", frames_, folder_.c_str());
+  }
+
+ private:
+  fs::path folder_;
+  replay::SequenceWriter measured_, ideal_;
+  int frames_ = 0;
+};
+
+void write_room(const Options& options) {
   auto camera = replay::synthetic_camera(options.width, options.height);
   if (options.focal > 0) camera.fx = camera.fy = options.focal;
-  const fs::path folder = frontier_surfels::absolute_path(options.output);
-  replay::SequenceWriter measured(folder, camera), ideal(folder / "truth", camera);
-
+  Output output(frontier_surfels::absolute_path(options.output), camera);
   const replay::Room room(options.scene, options.frames);
-  for (int index = 0; index < options.frames; ++index) {
-    replay::SensedFrame frame = room.sense(index, options.frames, camera, options.sensor, options.path);
-    measured.add(frame.measured);
-    frame.ideal.color.release();
-    ideal.add(frame.ideal);
+  for (int index = 0; index < options.frames; ++index) output.add(room.sense(index, options.frames, camera, options.sensor, options.path));
+  output.close(room.things());
+}
+
+void write_spoilt(const Options& options) {
+  const auto source = replay::open_source(frontier_surfels::absolute_path(options.recording));
+  std::optional<Output> output;
+  int index = 0;
+  while (const auto frame = source->next()) {
+    if (!output) output.emplace(frontier_surfels::absolute_path(options.output), frame->intrinsics);
+    output->add(replay::spoilt(*frame, options.sensor, index++));
   }
-  measured.close();
-  ideal.close();
-  std::vector<frontier_surfels::scoring::SceneObject> objects;
-  for (const replay::SceneThing& thing : room.things()) objects.push_back(thing.object);
-  if (!objects.empty()) replay::write_text(folder / "truth" / "objects.json", replay::objects_text(objects));
-  std::printf("%d frames are in %s.\n", options.frames, folder.c_str());
+  if (!output) throw frontier_surfels::Error("No frame of '" + options.recording + "' could be used: check the recording.");
+  output->close({});
 }
 
 void declare_errors(CLI::App& app, replay::SensorModel& sensor) {
@@ -117,7 +149,7 @@ void declare_errors(CLI::App& app, replay::SensorModel& sensor) {
   app.add_option("--dropouts", sensor.dropouts,
                  "share of pixels that are lost in blobs; above 0, most pixels at edges and at grazing angles are lost as well")
       ->check(replay::number(0, 0.9));
-  app.add_option("--outliers", sensor.outliers, "share of pixels with a random depth from 0.5 to 5 m")->check(replay::number(0, 1));
+  app.add_option("--outliers", sensor.outliers, "share of pixels with a random depth from 0.5 to 3 m")->check(replay::number(0, 1));
   app.add_flag("--flying", sensor.flying,
                "pixels beside an edge lie anywhere between foreground and background, as with structured light and time of flight");
   app.add_option_function<std::string>(
@@ -126,6 +158,13 @@ void declare_errors(CLI::App& app, replay::SensorModel& sensor) {
       ->type_name("METRES,DEGREES")
       ->check([&](const std::string& text) { return read_pose_noise(text, sensor); });
   app.add_option("--seed", sensor.seed, "seed of all these errors");
+}
+
+/// @throws CLI::ValidationError if an option is given that a recording has no use for
+void refuse_room_options(const CLI::App& app) {
+  for (const char* name : {"--scene", "--frames", "--path", "--focal", "--size"}) {
+    if (app.count(name) > 0) throw CLI::ValidationError(name, "is for the room: leave it out, or leave out --from.");
+  }
 }
 
 }  // namespace
@@ -159,6 +198,9 @@ int main(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   app.add_option("--focal", options.focal, "focal length [pixel]; 0: fx and fy of a Kinect")->check(replay::number(0, 1e5));
   declare_errors(app, options.sensor);
+  app.add_option("--from", options.recording, "a bag or folder that gets these errors, instead of the room; truth/ is what it has recorded")
+      ->type_name("RECORDING")
+      ->check(replay::not_empty());
   std::string size = "640x480";
   app.add_option("--size", size, "width and height of the images [pixel]")->check([&](const std::string& text) {
     return read_size(text, options.width, options.height);
@@ -169,6 +211,11 @@ int main(int argc, char** argv) {
     options.scene = chosen.scene;
     options.path = path.empty() ? chosen.path : named(kPaths, path).path;
     if (options.frames == 0) options.frames = chosen.frames;
-    write_sequence(options);
+    if (options.recording.empty()) {
+      write_room(options);
+    } else {
+      refuse_room_options(app);
+      write_spoilt(options);
+    }
   });
 }

@@ -36,7 +36,7 @@ struct SensorModel {
   bool noise = false;   ///< as of a Kinect: disparity has a deviation of half a step and is rounded to whole steps; in depth, a deviation
                         ///< of 1.425e-3 z^2 and steps of 2.85e-3 z^2 [m]
   double dropouts = 0;  ///< share of pixels lost in random blobs; above 0, most pixels at jump edges and grazing angles are lost as well
-  double outliers = 0;  ///< share of pixels whose depth is random, evenly from 0.5 to 5 m
+  double outliers = 0;  ///< share of pixels whose depth is random, evenly from 0.5 to 3 m
   bool flying = false;  ///< the pixels on both sides of a jump of depth lie anywhere between foreground and background
   double position_noise = 0;  ///< standard deviation of each coordinate of the recorded position [m], new in each frame
   double rotation_noise = 0;  ///< the same of the recorded rotation about each axis of the camera [rad]

@@ -14,7 +14,7 @@ constexpr double kJump = 0.04;                 // smallest relative step of dept
 constexpr double kLostAtEdges = 0.7;           // share of pixels
 constexpr double kSmallestBlob = 2.0 / 640.0;  // radius over image width
 constexpr double kLargestBlob = 16.0 / 640.0;
-constexpr double kNearestOutlier = 0.5, kFarthestOutlier = 5;  // [m]
+constexpr double kNearestOutlier = 0.5, kFarthestOutlier = 3;  // [m] the default range of the mapper, so that all outliers count
 
 // Each kind of error has random numbers of its own, so that one does not change another.
 constexpr std::uint64_t kNoiseStream = 0, kOutlierStream = 1, kFlyingStream = 2, kPoseStream = 3;
@@ -38,13 +38,15 @@ void add_noise(cv::Mat& depth, cv::RNG& random) {
 
 bool is_jump(float a, float b) { return std::abs(a - b) > kJump * std::min(a, b); }
 
-/// The smallest and the largest depth of a pixel and the four beside it.
+/// The smallest and the largest depth of a pixel and the four beside it, without those that have none.
 std::pair<float, float> depths_around(const cv::Mat& depth, int row, int column) {
   float near = depth.at<float>(row, column), far = near;
   const auto add = [&](int other_row, int other_column) {
     if (other_row < 0 || other_row >= depth.rows || other_column < 0 || other_column >= depth.cols) return;
-    near = std::min(near, depth.at<float>(other_row, other_column));
-    far = std::max(far, depth.at<float>(other_row, other_column));
+    const float z = depth.at<float>(other_row, other_column);
+    if (!(z > 0)) return;
+    near = std::min(near, z);
+    far = std::max(far, z);
   };
   add(row - 1, column);
   add(row + 1, column);
@@ -129,6 +131,19 @@ cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const Sensor
   std::transform(measured.begin<float>(), measured.end<float>(), millimetres.begin<std::uint16_t>(),
                  [](float z) { return z < 65.535f ? static_cast<std::uint16_t>(std::lround(z * 1000)) : 0; });
   return millimetres;
+}
+
+SensedFrame spoilt(const RecordedFrame& frame, const SensorModel& sensor, int index) {
+  SensedFrame sensed{frame, frame};
+  sensed.ideal.index = sensed.measured.index = static_cast<std::size_t>(index);
+  if (frame.depth.type() == CV_16UC1) {
+    sensed.ideal.depth = cv::Mat(frame.depth.size(), CV_32FC1);
+    std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), sensed.ideal.depth.begin<float>(),
+                   [](std::uint16_t z) { return z == 65535 ? 0 : static_cast<float>(z * 1e-3); });
+  }
+  sensed.measured.depth = measure(sensed.ideal.depth, cv::Mat::ones(frame.depth.size(), CV_32FC1), sensor, index);
+  sensed.measured.T_world_camera = tracked(frame.T_world_camera, sensor, index);
+  return sensed;
 }
 
 Eigen::Isometry3d tracked(const Eigen::Isometry3d& T_world_camera, const SensorModel& sensor, int index) {
