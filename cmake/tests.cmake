@@ -10,7 +10,7 @@ set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
 file(MAKE_DIRECTORY ${POCL_CACHE})
 
 # Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
-set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|octomap_truth|real_data|summary|synthetic_room|tools).*)\\.cpp$")
+set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|object|octomap_truth|real_data|summary|synthetic|tools|truth).*)\\.cpp$")
 # These of ROS need only the node's library: ThreadSanitizer's build of them is then half as large.
 set(NEED_NO_RECORDINGS "/ros/test_(inbox|map_publisher|worker)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
@@ -101,7 +101,7 @@ if(NOT FRONTIER_SURFELS_TOOLS)
 endif()
 
 # The programs as a user calls them. /usr/bin/python3 is the Python that has the report's modules.
-foreach(name test_replay_score test_replay_failures)
+foreach(name test_replay_score test_replay_failures test_replay_truth)
   add_test(NAME ${name}
     COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/${name}.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
 endforeach()
@@ -109,7 +109,7 @@ add_test(NAME test_report_page COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}
 add_test(NAME test_bench
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_bench.py $<TARGET_FILE:bench> $<TARGET_FILE:make_synthetic>
     ${PROJECT_SOURCE_DIR}/scripts/bench_table)
-set_tests_properties(test_replay_score test_replay_failures test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
+set_tests_properties(test_replay_score test_replay_failures test_replay_truth test_bench PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
 
 if(FRONTIER_SURFELS_WITH_ROS)
   include(cmake/ros_tests.cmake)

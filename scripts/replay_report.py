@@ -78,6 +78,10 @@ def headlines(summary):
             (percent(exact['right']), 'right', 'of the surfels: the point a quarter of a radius behind the surfel is unknown, the point 7/4 of a radius before it '
              'is known, judged by the frames themselves.'),
             (percent(exact['miss_2cm']), 'missed', 'of the exact boundary: there is no surfel within 2 cm.')]
+    if 'truth' in summary:
+        truth = summary['truth']
+        result += [(percent(truth['right']), 'right by the truth', 'of the surfels, judged by what an ideal sensor would have seen.'),
+                   (percent(truth['miss_2cm']), 'missed by the truth', 'of the boundary that an ideal sensor would have found.')]
     if 'octomap' in summary:
         octomap = summary['octomap']
         ratio, what = speed_ratio(summary)
@@ -155,16 +159,47 @@ def memory_rows(summary, bytes_per_surfel):
     return rows
 
 
-def exact_rows(summary):
-    names = [('right', 'Right: unknown behind it, known before it'), ('buried', 'Buried: known on both sides'),
-             ('floating', 'Floating: unknown on both sides'), ('flipped', 'Flipped: known only behind'),
-             ('within_1v', 'Boundary at most 1 voxel away along the normal'),
-             ('within_2v', 'Boundary at most 2 voxels away along the normal'),
-             ('fdr_2cm', 'Boundary further than 2 cm away along the normal'),
-             ('fdr_5cm', 'Boundary further than 5 cm away along the normal'),
-             ('miss_1cm', 'No surfel within 1 cm'), ('miss_2cm', 'No surfel within 2 cm'), ('miss_5cm', 'No surfel within 5 cm'),
-             ('label_ok', 'Label is right, of the points with a surfel within 2 cm')]
-    return [(text, percent(summary['exact'][key])) for key, text in names] if 'exact' in summary else []
+EXACT_SURFELS = [('right', 'Right: unknown behind it, known before it'), ('buried', 'Buried: known on both sides'),
+                 ('floating', 'Floating: unknown on both sides'), ('flipped', 'Flipped: known only behind'),
+                 ('within_1v', 'Boundary at most 1 voxel away along the normal'),
+                 ('within_2v', 'Boundary at most 2 voxels away along the normal'),
+                 ('fdr_2cm', 'Boundary further than 2 cm away along the normal'),
+                 ('fdr_5cm', 'Boundary further than 5 cm away along the normal')]
+EXACT_BOUNDARY = [('miss_1cm', 'No surfel within 1 cm'), ('miss_2cm', 'No surfel within 2 cm'), ('miss_5cm', 'No surfel within 5 cm'),
+                  ('label_ok', 'Label is right, of the points with a surfel within 2 cm')]
+
+
+def exact_tables(summary):
+    """Two tables, of the surfels and of the boundary points, with a column for each cloud of surfels and each judge."""
+    octomap = summary.get('octomap', {})
+    columns = [('by the frames', summary.get('exact')), ('by the truth', summary.get('truth')),
+               ('OctoMap by the frames', octomap.get('exact')), ('OctoMap by the truth', octomap.get('truth'))]
+    columns = [(name, score) for name, score in columns if score is not None]
+    tables = []
+    for names, of_what in ((EXACT_SURFELS, 'of the surfels'), (EXACT_BOUNDARY, 'of the boundary points')):
+        head = ['', of_what] if 'truth' not in summary else [of_what, *(name for name, _ in columns)]
+        tables.append({'head': head, 'rows': [(text, *(percent(score[key]) for _, score in columns)) for key, text in names]})
+    return tables if columns else []
+
+
+def stands_table(objects):
+    """A row for each stand of an object and each cosine."""
+    rows = []
+    for thing in objects:
+        for stand in thing['stands']:
+            for faces in stand['faces']:
+                rows.append((thing['name'], f"{stand['first']} to {stand['last']}", str(stand.get('first_seen', NONE)), f"{faces['cosine']:g}",
+                             percent(faces.get('early_covered')), percent(faces.get('covered'))))
+    return {'head': ['object', 'stands in frames', 'first seen', 'cosine above', 'on the map 8 frames later', 'at the end'], 'rows': rows}
+
+
+def left_table(objects):
+    rows = []
+    for thing in objects:
+        if 'left' in thing:
+            counts = [count for key in ('left', 'most_left') for count in (thing.get(key, {}).get(label) for label in ('occupied', 'frontier'))]
+            rows.append((thing['name'], *(number(count) for count in counts)))
+    return {'head': ['object', 'occupied, at the end', 'frontier, at the end', 'occupied, most', 'frontier, most'], 'rows': rows}
 
 
 def embedded(mime, data):
@@ -223,7 +258,8 @@ def page(folder):
         accuracy=table(['', 'here'], accuracy_rows(summary)),
         times=table(['', 'here', 'OctoMap', 'paper, CPU', 'paper, GPU'], time_rows(summary)),
         stages=table(['', 'mean', 'median', 'share', 'paper, CPU', 'paper, GPU'], stage_rows(summary)),
-        memory=table(['', 'here', 'paper'], memory_rows(summary, bytes_per_surfel)), exact=exact_rows(summary), pictures=pictures(folder),
+        memory=table(['', 'here', 'paper'], memory_rows(summary, bytes_per_surfel)), exact=exact_tables(summary), pictures=pictures(folder),
+        stands=stands_table(summary.get('objects', [])), left=left_table(summary.get('objects', [])),
         gaps=octomap is not None and has_gaps(octomap), millimetres=millimetres,
         sweep=sweep_plot(folder, summary),
         time_plot=embedded('image/svg+xml', report_plots.time_per_frame(frames, list(summary['time_ms']['stages']))),

@@ -90,7 +90,7 @@ class CommandLine(unittest.TestCase):
                 ('replay_score', [*there, '--set', 'decimation=0'], 'decimation is 0 pixel: it must be from 1 to 64 pixel.'),
                 ('replay_score', [*there, '--sweep', 'th_d'], "--sweep 'th_d' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9."),
                 ('make_synthetic', ['x', '--frames', 'many'], "--frames: must be a whole number from 1 to 999999, not 'many'."),
-                ('make_synthetic', ['x', '--path', 'up'], "--path: must be orbit, explore, turn, walk or close, not 'up'."),
+                ('make_synthetic', ['x', '--path', 'up'], "--path: must be orbit, explore, turn, walk, close, arc or watch, not 'up'."),
                 ('make_synthetic', ['x', '--dropouts', 'nan'], "--dropouts: must be a number from 0 to 0.9, not 'nan'."),
                 ('sequence_to_bag', ['x', 'x.bag', '--depth-unit', 'inf'], "--depth-unit: must be a number above 0, not 'inf'."),
                 ('sequence_to_bag', ['x', 'x.bag', '--encoding', 'rgb8'], "--encoding: must be 32FC1 or 16UC1, not 'rgb8'."),

@@ -120,7 +120,7 @@ class Usage(unittest.TestCase):
         usage = run('--help')
         self.assertEqual((usage.returncode, usage.stderr), (DONE, ''))
         for option in ('--report --config --set --first --last --stride --depth-topic --info-topic --color-topic --world-frame '
-                       '--octomap-resolution --no-exact --threads --sweep --live --mapper --parameters').split():
+                       '--octomap-resolution --truth --no-exact --threads --sweep --live --mapper --parameters').split():
             self.assertIn(option, usage.stdout)
         table = run('--parameters')
         self.assertEqual((table.returncode, table.stderr), (DONE, ''))

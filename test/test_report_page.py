@@ -50,6 +50,48 @@ class Page(unittest.TestCase):
         self.assertIn('<th>OctoMap</th>', self.page())
         self.assertNotIn('<th>OctoMap</th>', self.page(lambda summary: summary.pop('octomap')))
 
+    def with_truth(self, summary):
+        names = list(summary['exact'])
+        summary['input']['truth'] = 'a/room/truth'
+        for part, share in ((summary, 0.5), (summary['octomap'], 0.75)):
+            part['truth'] = dict.fromkeys(names, share)
+        summary['octomap']['exact'] = dict.fromkeys(names, 0.125)
+
+    def rows(self, page):
+        """The cells of all rows of all tables."""
+        return [tuple(cell.strip() for cell in re.findall('<t[hd]>(.*?)</t[hd]>', row)) for row in re.findall('<tr>.*?</tr>', page)]
+
+    def test_truth_stands_beside_the_exact_test(self):
+        rows = self.rows(self.page())
+        self.assertIn(('', 'of the surfels'), rows)
+        self.assertIn(('No surfel within 2 cm', '25.0 %'), rows)
+        self.assertNotIn('by the truth', self.page())
+        page = self.page(self.with_truth)
+        self.assertIn(('of the surfels', 'by the frames', 'by the truth', 'OctoMap by the frames', 'OctoMap by the truth'), self.rows(page))
+        self.assertIn(('No surfel within 2 cm', '25.0 %', '50.0 %', '12.5 %', '75.0 %'), self.rows(page))
+        self.assertIn('<code>a/room/truth</code>', page)
+        self.assertRegex(page, '<b>50.0 %</b><i>right by the truth</i>')
+
+        def truth_alone(summary):
+            self.with_truth(summary)
+            del summary['exact'], summary['octomap']
+        page = self.page(truth_alone)
+        self.assertIn(('of the boundary points', 'by the truth'), self.rows(page))
+        self.assertNotIn('error of the exact test', page)
+
+    def test_objects_have_their_tables(self):
+        self.assertNotIn('come and go', self.page())
+
+        def with_objects(summary):
+            faces = [{'cosine': 0.17, 'early_points': 5, 'early_covered': 0.2, 'points': 9, 'covered': 0.6}, {'cosine': 0.1}]
+            summary['objects'] = [
+                {'name': 'box', 'stands': [{'first': 10, 'last': 50, 'first_seen': 12, 'faces': faces}]},
+                {'name': 'person', 'stands': [], 'left': {'occupied': 3, 'frontier': 0}, 'most_left': {'occupied': 7, 'frontier': 1234}}]
+        rows = self.rows(self.page(with_objects))
+        self.assertIn(('box', '10 to 50', '12', '0.17', '20.0 %', '60.0 %'), rows)
+        self.assertIn(('box', '10 to 50', '12', '0.1', self.report.NONE, self.report.NONE), rows)
+        self.assertIn(('person', '3', '0', '7', '1 234'), rows)
+
     def test_speed_says_what_was_compared(self):
         self.assertRegex(self.page(), r"<b>2\.50 ×</b>.*?CPU time \(OctoMap's one thread\) against CPU time \(all threads of this program\)")
         self.assertRegex(self.page(lambda summary: summary.pop('cpu_ms')), r'<b>6\.00 ×</b>.*?Wall time against wall time')

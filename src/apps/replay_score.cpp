@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 struct Options {
   Recording recording;
   std::string report;  ///< folder of the report
+  std::string truth;   ///< folder of what an ideal sensor would have seen; empty: none
   Config config;
   OctomapResolution octomap_resolution;
   bool exact = true;
@@ -89,6 +90,12 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
                  "voxel size [m] of the OctoMap that is built for comparison; 0: none; default auto: the distance between pixels at z_max, "
                  "where OctoMap has no gaps between rays")
       ->type_name("M");
+  app.add_option(
+         "--truth", options.truth,
+         "folder with the same frames as an ideal sensor would have seen them, such as the truth/ that make_synthetic writes: the map is "
+         "judged by these as well")
+      ->type_name("FOLDER")
+      ->check(not_empty());
   app.add_flag("--no-exact", raw.no_exact, "leave out the exact test");
   app.add_option("--threads", raw.threads, "number of threads of the mapper and the scores; 0: all")
       ->type_name("N")
@@ -164,7 +171,7 @@ Options parse(int argc, char** argv) {
   read_arguments(app, {arguments.rbegin(), arguments.rend()}, [&] {
     app.parse(arguments);
     // With --report=~/x and in launch files no shell has expanded the `~`.
-    for (std::string* path : {&options.recording.path, &options.report, &raw.config_file}) *path = absolute_path(*path);
+    for (std::string* path : {&options.recording.path, &options.report, &options.truth, &raw.config_file}) *path = absolute_path(*path);
     const int last = options.recording.options.last;
     if (last >= 0 && last < options.recording.options.first) throw CLI::ValidationError("--last", "is before --first.");
     options.octomap_resolution = octomap_resolution(raw.octomap_resolution);
@@ -215,9 +222,10 @@ void replay_and_score(const Options& options) {
   catch_first_interrupt();
   auto live = options.live ? open_live_replay(options.recording, *options.live, stop_requested) : nullptr;
   const Config config = live ? live->config() : options.config;
+  const auto truth = options.truth.empty() ? nullptr : std::make_shared<TruthFolder>(options.truth, options.recording.path);
   ReportFolder folder(options.report);
 
-  Yardsticks yardsticks(config, options.octomap_resolution, options.exact);
+  Yardsticks yardsticks(config, options.octomap_resolution, options.exact, truth);
   const Run run = live ? live->map(&yardsticks, stop_requested) : map_recording(options.recording, config, &yardsticks, stop_requested);
   live.reset();  // disconnects: the mapper must not send to a program that is busy scoring
   tell_skipped(run.skipped);

@@ -143,7 +143,9 @@ std::optional<RecordedFrame> BagSource::next() {
     if (++done_ < selection_.count) std::advance(next_depth_, static_cast<std::ptrdiff_t>(selection_.stride));
     const std::string frame = "Frame " + std::to_string(index) + " of " + topics_.depth + " is skipped: ";
     try {
-      return read(message);
+      RecordedFrame recorded = read(message);
+      recorded.index = index;
+      return recorded;
     } catch (const BadFrame& fault) {
       skipped_.push_back(frame + fault.what() + ".");
     } catch (const std::exception& fault) {  // of rosbag, and std::bad_alloc because of damaged sizes

@@ -18,7 +18,7 @@ constexpr float kTumUnitsPerMetre = 5000.0f;
 bool is_image(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg" || extension == ".tif" || extension == ".tiff";
 }
 
 bool is_number(const fs::path& path) {
@@ -56,21 +56,6 @@ cv::Mat read_image(const fs::path& path, int flags) {
   }
 }
 
-/// @throws BadFrame if the numbers are not a pose
-Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
-  if (numbers.empty()) {
-    throw BadFrame("no pose lies within " + std::to_string(std::lround(kAssociationTolerance * 1e3)) + " ms of its stamp");
-  }
-  if (!std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); })) {
-    throw BadFrame("its pose is not finite");
-  }
-  const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
-  if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
-    throw BadFrame("the quaternion of its pose has the length " + fixed_text(rotation.norm(), 6) + " instead of 1");
-  }
-  return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
-}
-
 /// The element nearest to `stamp` in a list sorted by stamp, or null if none is within the tolerance.
 template <typename T>
 const T* nearest(const std::vector<T>& sorted, double stamp) {
@@ -88,6 +73,20 @@ const T* nearest(const std::vector<T>& sorted, double stamp) {
 }
 
 }  // namespace
+
+Eigen::Isometry3d to_pose(const std::vector<double>& numbers) {
+  if (numbers.empty()) {
+    throw BadFrame("no pose lies within " + std::to_string(std::lround(kAssociationTolerance * 1e3)) + " ms of its stamp");
+  }
+  if (!std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); })) {
+    throw BadFrame("its pose is not finite");
+  }
+  const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance)) {
+    throw BadFrame("the quaternion of its pose has the length " + fixed_text(rotation.norm(), 6) + " instead of 1");
+  }
+  return Eigen::Translation3d(numbers[0], numbers[1], numbers[2]) * rotation.normalized();
+}
 
 FolderSource::FolderSource(const fs::path& folder, const SourceOptions& options) : folder_(folder) {
   if (fs::exists(folder / "poses.txt")) {
@@ -174,38 +173,44 @@ void FolderSource::choose_tum_camera() {
 
 std::optional<RecordedFrame> FolderSource::next() {
   while (done_ < selection_.count) {
-    const Entry& entry = entries_[selection_.first + done_++ * selection_.stride];
+    const std::size_t index = selection_.first + done_++ * selection_.stride;
     try {
-      return read(entry);
+      return read(index);
     } catch (const BadFrame& fault) {
-      skipped_.push_back("Frame " + entry.depth.string() + " is skipped: " + fault.what() + ".");
+      skipped_.push_back("Frame " + entries_[index].depth.string() + " is skipped: " + fault.what() + ".");
     }
   }
   return std::nullopt;
 }
 
-RecordedFrame FolderSource::read(const Entry& entry) {
+RecordedFrame FolderSource::read(std::size_t index) {
+  const Entry& entry = entries_[index];
   RecordedFrame frame;
   if (!std::isfinite(entry.stamp)) throw BadFrame("its stamp is not finite");
+  frame.index = index;
   frame.stamp = entry.stamp;
   frame.T_world_camera = to_pose(entry.pose);
   frame.intrinsics = intrinsics_;
-  if (!fs::exists(entry.depth)) throw BadFrame("there is no such file");
-  frame.depth = read_image(entry.depth, cv::IMREAD_UNCHANGED);
-  if (frame.depth.empty()) throw BadFrame("the image cannot be read");
-  if (frame.depth.type() != CV_16UC1) throw BadFrame("the image must have one channel of 16 bits");
-  if (frame.depth.size() != cv::Size(intrinsics_.width, intrinsics_.height)) {
-    throw BadFrame("the image has " + std::to_string(frame.depth.cols) + "x" + std::to_string(frame.depth.rows) +
-                   " pixels, but camera.txt says " + std::to_string(intrinsics_.width) + "x" + std::to_string(intrinsics_.height));
-  }
-  if (tum_layout_) {
-    cv::Mat metres(frame.depth.size(), CV_32FC1);
-    std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), metres.begin<float>(),
-                   [](std::uint16_t value) { return value == 65535 ? 0 : static_cast<float>(value) / kTumUnitsPerMetre; });
-    frame.depth = metres;
-  }
+  frame.depth = read_depth(entry);
   if (!entry.color.empty()) frame.color = read_color(entry, frame.depth.size());
   return frame;
+}
+
+/// @return CV_16UC1 as it is recorded, or CV_32FC1 [m]
+cv::Mat FolderSource::read_depth(const Entry& entry) const {
+  if (!fs::exists(entry.depth)) throw BadFrame("there is no such file");
+  const cv::Mat depth = read_image(entry.depth, cv::IMREAD_UNCHANGED);
+  if (depth.empty()) throw BadFrame("the image cannot be read");
+  if (depth.type() != CV_16UC1 && depth.type() != CV_32FC1) throw BadFrame("the image must have one channel of 16 bits, or of floats");
+  if (depth.size() != cv::Size(intrinsics_.width, intrinsics_.height)) {
+    throw BadFrame("the image has " + std::to_string(depth.cols) + "x" + std::to_string(depth.rows) + " pixels, but camera.txt says " +
+                   std::to_string(intrinsics_.width) + "x" + std::to_string(intrinsics_.height));
+  }
+  if (!tum_layout_ || depth.type() == CV_32FC1) return depth;
+  cv::Mat metres(depth.size(), CV_32FC1);
+  std::transform(depth.begin<std::uint16_t>(), depth.end<std::uint16_t>(), metres.begin<float>(),
+                 [](std::uint16_t value) { return value == 65535 ? 0 : static_cast<float>(value) / kTumUnitsPerMetre; });
+  return metres;
 }
 
 /// The colour image of a frame, or an empty one. A fault of a colour image never drops a frame.

@@ -10,9 +10,10 @@ namespace frontier_surfels::replay {
 
 /// A frame that owns its images. They are in this machine's byte order.
 struct RecordedFrame {
-  double stamp = 0;  ///< [s]
-  cv::Mat depth;     ///< CV_16UC1 [Config::depth_unit] or CV_32FC1 [m]
-  cv::Mat color;     ///< CV_8UC3, BGR, registered to depth; empty where there is none
+  std::size_t index = 0;  ///< place in the recording, counted from 0
+  double stamp = 0;       ///< [s]
+  cv::Mat depth;          ///< CV_16UC1 [Config::depth_unit] or CV_32FC1 [m]
+  cv::Mat color;          ///< CV_8UC3, BGR, registered to depth; empty where there is none
   Intrinsics intrinsics;
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d(Eigen::Matrix4d::Constant(std::nan("")));  ///< optical frame
 

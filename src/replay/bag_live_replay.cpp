@@ -76,7 +76,8 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
   }
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
   record.depths = count_depths(frame.view().depth, run.config);
-  if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view());
+  record.index = frame.index;
+  if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view(), frame.index);
   run.frames.push_back(std::move(record));
 }
 

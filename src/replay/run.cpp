@@ -15,14 +15,17 @@ constexpr std::size_t kSegments = 40000;  // of the exact test: the standard err
 
 }  // namespace
 
-Yardsticks::Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact)
+Yardsticks::Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact, std::shared_ptr<TruthFolder> truth)
     : config_(config), octomap_resolution_(octomap_resolution) {
   if (exact) exact_.emplace(config);
+  if (truth) truth_.emplace(config, std::move(truth));
 }
 
-std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame) {
+std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame, std::size_t index,
+                                                      const scoring::ObjectTest::SurfelsIn& surfels_in) {
   if (pixel_spacing_ == 0) pixel_spacing_ = config_.decimation * config_.z_max / std::min(frame.intrinsics.fx, frame.intrinsics.fy);
   if (exact_) exact_->add(frame);
+  if (truth_) truth_->add(index, frame, surfels_in);
   if (octomap_resolution() == 0) return std::nullopt;
   if (!octomap_) octomap_.emplace(octomap_resolution(), config_);
   return octomap_->add(frame);
@@ -67,6 +70,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
       record.cpu_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_before_ms;
       record.depths = count_depths(view.depth, run.config);
+      record.index = frame->index;
       after_frame(view, record);
       run.frames.push_back(std::move(record));
     } catch (const BadFrame& refused) {
@@ -93,8 +97,9 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
     throw Error("The map folder '" + config.map_folder +
                 "' already has a map, which would be scored as if it were made of this recording: delete the folder, or choose another.");
   }
-  const auto measure = [yardsticks](const DepthFrame& view, FrameRecord& record) {
-    if (yardsticks != nullptr) record.octomap = yardsticks->add(view);
+  const auto surfels_in = [&mapper](const Eigen::AlignedBox3d& box) { return mapper.surfels(box.cast<float>()); };
+  const auto measure = [&](const DepthFrame& view, FrameRecord& record) {
+    if (yardsticks != nullptr) record.octomap = yardsticks->add(view, record.index, surfels_in);
   };
   Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty() && !run.unsaved.empty()) throw FileError(run.unsaved);
@@ -130,17 +135,36 @@ Error nothing_usable(const Recording& recording, const std::vector<std::string>&
                " skipped, the first because: " + skipped.front());
 }
 
-Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads) {
+namespace {
+
+scoring::ExactScore exact_score(const std::string& title, const scoring::ExactTest& test, const std::vector<Surfel>& surfels, int threads,
+                                std::vector<scoring::Verdict>* verdicts = nullptr) {
+  Progress progress(title, 1);
+  const auto show = [&progress](double share) {
+    progress.update(share);
+    return true;
+  };
+  return test.score(surfels, kSegments, threads, show, verdicts);
+}
+
+}  // namespace
+
+Scores score_map(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads) {
   Scores scores;
   if (yardsticks.octomap()) scores.octomap = yardsticks.octomap()->score(surfels, yardsticks.octomap_boundary());
-  if (yardsticks.exact()) {
-    Progress progress("Scoring", 1);
-    const auto show = [&progress](double share) {
-      progress.update(share);
-      return true;
-    };
-    scores.exact = yardsticks.exact()->score(surfels, kSegments, threads, show, &scores.verdicts);
-  }
+  if (yardsticks.exact()) scores.exact = exact_score("Scoring", *yardsticks.exact(), surfels, threads, &scores.verdicts);
+  if (yardsticks.truth()) scores.truth = exact_score("Scoring by the truth", yardsticks.truth()->exact(), surfels, threads);
+  return scores;
+}
+
+Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads) {
+  Scores scores = score_map(surfels, yardsticks, threads);
+  if (!yardsticks.truth()) return scores;
+  scores.objects = yardsticks.truth()->objects(surfels);
+  if (!yardsticks.octomap()) return scores;
+  const std::vector<Surfel>& boundary = yardsticks.octomap_boundary();
+  if (yardsticks.exact()) scores.octomap_exact = exact_score("Scoring OctoMap", *yardsticks.exact(), boundary, threads);
+  scores.octomap_truth = exact_score("Scoring OctoMap by the truth", yardsticks.truth()->exact(), boundary, threads);
   return scores;
 }
 

@@ -13,6 +13,7 @@
 #include "frontier_surfels/scoring/octomap_truth.hpp"
 #include "frontier_surfels/types.hpp"
 #include "recordings/frame_source.hpp"
+#include "replay/truth.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -26,16 +27,22 @@ struct Recording {
 /// gaps between rays.
 using OctomapResolution = std::optional<double>;
 
-/// What a map is scored against: the exact test and OctoMap. They must get the same frames as the map.
+/// What a map is scored against: the exact test, OctoMap and the truth. They must get the same frames as the map.
 class Yardsticks {
  public:
-  Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact);
+  /// @param truth  null: none
+  Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact, std::shared_ptr<TruthFolder> truth = nullptr);
 
+  /// @param index       of the frame in the recording
+  /// @param surfels_in  the map after the frame, for the truth's objects; may be empty
   /// @return the time of OctoMap for this frame, if there is an OctoMap
-  std::optional<scoring::InsertionTime> add(const DepthFrame& frame);
+  /// @throws Error  the truth has no such frame
+  std::optional<scoring::InsertionTime> add(const DepthFrame& frame, std::size_t index = 0,
+                                            const scoring::ObjectTest::SurfelsIn& surfels_in = {});
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
   const std::optional<scoring::OctomapTruth>& octomap() const { return octomap_; }  ///< empty before the first frame as well
+  const std::optional<Truth>& truth() const { return truth_; }
 
   double octomap_resolution() const { return octomap_resolution_.value_or(pixel_spacing_); }  ///< [m]; 0: none
   /// Largest distance between neighbouring pixels at z_max, of the first frame [m].
@@ -53,6 +60,7 @@ class Yardsticks {
   double pixel_spacing_ = 0;
   std::optional<scoring::ExactTest> exact_;
   std::optional<scoring::OctomapTruth> octomap_;
+  std::optional<Truth> truth_;
   mutable std::optional<std::vector<Surfel>> octomap_boundary_;
 };
 
@@ -61,7 +69,8 @@ struct FrameRecord {
   Eigen::Isometry3d T_world_camera;
   std::optional<scoring::InsertionTime> octomap;
   DepthCensus depths = {};
-  double cpu_ms = 0;  ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
+  double cpu_ms = 0;      ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured
+  std::size_t index = 0;  ///< of the frame in the recording
 };
 
 /// The result of mapping a recording.
@@ -112,8 +121,17 @@ struct Scores {
   std::optional<scoring::OctomapScore> octomap;
   std::optional<scoring::ExactScore> exact;
   std::vector<scoring::Verdict> verdicts;  ///< of the exact test, one for each surfel
+
+  // Only with a truth:
+  std::optional<scoring::ExactScore> truth;                         ///< of the map, by the ideal frames
+  std::optional<scoring::ExactScore> octomap_exact, octomap_truth;  ///< of OctoMap's boundary, by the recorded and the ideal frames
+  std::vector<scoring::ObjectScore> objects;
 };
 
+/// Scores of a map alone: octomap, exact, truth.
+Scores score_map(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads);
+
+/// All scores. @param surfels  the map after the last frame that the yardsticks have got
 Scores score(const std::vector<Surfel>& surfels, const Yardsticks& yardsticks, int threads);
 
 }  // namespace frontier_surfels::replay

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "config/c_locale.hpp"
+#include "replay/objects_summary.hpp"
 #include "replay/warnings.hpp"
 
 namespace frontier_surfels::replay {
@@ -139,6 +140,7 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
   const std::vector<FrameRecord> warm = warm_frames(run.frames);
   ordered_json json;
   json["input"] = {{"path", recording.path}, {"frames", run.frames.size()}, {"skipped", run.skipped.size()}};
+  if (yardsticks.truth()) json["input"]["truth"] = yardsticks.truth()->folder()->path();
   json["version"] = FRONTIER_SURFELS_VERSION;
   json["date"] = run.date;
   json["world_frame"] = run.world_frame;
@@ -163,8 +165,12 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
                        {"cpu_ms", mean_and_median(column(warm, octomap_cpu_ms))},
                        {"memory_mb", yardsticks.octomap()->memory_mb()}};
     json["octomap"].update(octomap_json(*scores.octomap));
+    if (scores.octomap_exact) json["octomap"]["exact"] = exact_json(*scores.octomap_exact);
+    if (scores.octomap_truth) json["octomap"]["truth"] = exact_json(*scores.octomap_truth);
   }
   if (scores.exact) json["exact"] = exact_json(*scores.exact);
+  if (scores.truth) json["truth"] = exact_json(*scores.truth);
+  if (!scores.objects.empty()) json["objects"] = objects_json(scores.objects);
   return json;
 }
 
@@ -206,6 +212,13 @@ std::string trajectory_text(const std::vector<FrameRecord>& frames) {
   return text;
 }
 
+/// The main figures of an exact test.
+std::string exact_line(const ordered_json& exact) {
+  const auto percent = [&](const char* figure) { return 100 * exact[figure].get<double>(); };
+  return formatted("right %.2f %%; more than 2 cm off %.2f %%; boundary missed by 2 cm %.2f %%; label right %.2f %%\n", percent("right"),
+                   percent("fdr_2cm"), percent("miss_2cm"), percent("label_ok"));
+}
+
 std::string result_table(const ordered_json& summary) {
   const auto& input = summary["input"];
   const auto& surfels = summary["surfels"];
@@ -217,11 +230,9 @@ std::string result_table(const ordered_json& summary) {
   table +=
       formatted("time        median %.1f ms a frame, 95 %% below %.1f ms, at most %.1f ms\n", time["median"], time["p95"], time["max"]);
   const auto percent = [](const ordered_json& share) { return 100 * share.get<double>(); };
-  if (summary.contains("exact")) {
-    const auto& exact = summary["exact"];
-    table += formatted("exact test  right %.2f %%; more than 2 cm off %.2f %%; boundary missed by 2 cm %.2f %%; label right %.2f %%\n",
-                       percent(exact["right"]), percent(exact["fdr_2cm"]), percent(exact["miss_2cm"]), percent(exact["label_ok"]));
-  }
+  if (summary.contains("exact")) table += "exact test  " + exact_line(summary["exact"]);
+  if (summary.contains("truth")) table += "truth       " + exact_line(summary["truth"]);
+  if (summary.contains("objects")) table += objects_table(summary["objects"]);
   if (summary.contains("octomap")) {
     const auto& octomap = summary["octomap"];
     table += formatted("OctoMap     voxels of %.1f mm, median %.1f ms a frame, %.1f MB; ", 1000 * octomap["resolution"].get<double>(),
@@ -231,6 +242,8 @@ std::string result_table(const ordered_json& summary) {
       table += formatted("            FOR counts OctoMap's own gaps: at z_max, pixels are %.1f mm apart\n",
                          1000 * octomap["pixel_spacing"].get<double>());
     }
+    if (octomap.contains("exact")) table += "            exact test: " + exact_line(octomap["exact"]);
+    if (octomap.contains("truth")) table += "            truth: " + exact_line(octomap["truth"]);
   }
   for (const char* kind : {"warnings", "notes"}) {
     constexpr std::size_t kShown = 5;

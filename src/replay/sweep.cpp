@@ -68,6 +68,7 @@ ordered_json point_json(double value, const Run& run, const Scores& scores) {
                         {"time_ms_median", time_statistics(total_ms).median}};
   if (scores.octomap) point["octomap"] = octomap_json(*scores.octomap);
   if (scores.exact) point["exact"] = exact_json(*scores.exact);
+  if (scores.truth) point["truth"] = exact_json(*scores.truth);
   return point;
 }
 
@@ -114,10 +115,11 @@ ordered_json run_sweep(const Sweep& sweep, const Recording& recording, const Yar
     const double value = number(config, sweep.parameter);
     std::cerr << "Sweep: " << sweep.parameter << " = " << value << "\n";
     std::optional<Yardsticks> own;
-    if (!yardsticks.fit(config)) own.emplace(config, octomap_resolution, yardsticks.exact().has_value());
+    if (!yardsticks.fit(config))
+      own.emplace(config, octomap_resolution, yardsticks.exact().has_value(), yardsticks.truth() ? yardsticks.truth()->folder() : nullptr);
     const Run run = map_recording(recording, config, own ? &*own : nullptr, stop);
     if (run.stopped) break;  // the scores of a part of the recording cannot be compared with the others
-    values.push_back(point_json(value, run, score(run.surfels, own ? *own : yardsticks, config.threads)));
+    values.push_back(point_json(value, run, score_map(run.surfels, own ? *own : yardsticks, config.threads)));
   }
   return {{"parameter", sweep.parameter}, {"unit", unit_of(sweep.parameter)}, {"values", values}};
 }

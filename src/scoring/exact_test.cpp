@@ -23,6 +23,15 @@ ExactTest& ExactTest::operator=(ExactTest&&) noexcept = default;
 
 void ExactTest::add(const DepthFrame& frame) { views_.emplace_back(frame, DepthReading(config_)); }
 
+void ExactTest::set_placed(const std::vector<PlacedBox>& placed) {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    std::vector<OrientedBox> voids;
+    for (const PlacedBox& box : placed)
+      if (i < box.frames_before) voids.push_back(box.box_world);
+    views_[i].set_voids(std::move(voids));
+  }
+}
+
 std::size_t ExactTest::size() const { return views_.size(); }
 
 bool ExactTest::known(const Eigen::Vector3d& p_world) const {

@@ -22,7 +22,7 @@ constexpr double kLabelDistance = 0.02;     // [m] Farther surfels do not speak 
 constexpr std::size_t kSegmentsPerBlock = 64;
 
 struct Segment {
-  Eigen::Vector3d start, direction;  ///< world; start [m] is known, direction is a unit vector
+  Eigen::Vector3d start, direction;  ///< world; start [m] was seen by a view, direction is a unit vector
 };
 
 /// Uniform numbers that are the same with every standard library.
@@ -74,7 +74,7 @@ class Marcher {
   std::optional<BoundaryPoint> boundary_along(const Segment& segment) {
     const auto at = [&](double t) -> Eigen::Vector3d { return segment.start + t * segment.direction; };
     double inside, outside;
-    if (!bracket(at, inside, outside)) return {};
+    if (is_void(segment.start) || !bracket(at, inside, outside)) return {};
     while (outside - inside > kBisectionWidth) {
       const double middle = (inside + outside) / 2;
       (known(at(middle)) ? inside : outside) = middle;
@@ -83,7 +83,9 @@ class Marcher {
     for (int i = 1; i <= kSheetSteps; ++i) {
       if (known(at(end + i * kSheetStep))) return {};
     }
-    return BoundaryPoint{at(end), just_behind_surface(at(end + kLabelProbe))};
+    const bool occupied = just_behind_surface(at(end + kLabelProbe));
+    if (!occupied && is_void(at(outside))) return {};  // a face of something new that nobody has seen yet
+    return BoundaryPoint{at(end), occupied};
   }
 
  private:
@@ -108,6 +110,11 @@ class Marcher {
       return true;
     }
     return false;
+  }
+
+  /// Whether the point is unknown only because something was put there.
+  bool is_void(const Eigen::Vector3d& p_world) {
+    return !known(p_world) && std::any_of(views_.begin(), views_.end(), [&](const ExactView& view) { return view.saw(p_world); });
   }
 
   bool just_behind_surface(const Eigen::Vector3d& p_world) const {

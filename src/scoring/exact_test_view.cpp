@@ -77,7 +77,9 @@ Coverage ExactView::coverage(const Eigen::Vector3d& centre_world, double radius)
 
   const Bounds depth_bounds = bounds(columns, rows);
   if (depth_bounds.max < z_near - kDepthMargin) return Coverage::kNone;
-  if (!columns.clipped && !rows.clipped && depth_bounds.min > z_far + kDepthMargin) return Coverage::kAll;
+  const bool touches_void =
+      std::any_of(voids_.begin(), voids_.end(), [&](const OrientedBox& box) { return box.distance(centre_world) <= radius; });
+  if (!columns.clipped && !rows.clipped && depth_bounds.min > z_far + kDepthMargin && !touches_void) return Coverage::kAll;
   return Coverage::kSome;
 }
 

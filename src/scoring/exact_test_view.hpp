@@ -1,9 +1,12 @@
 /// One frame of the exact test: what it has seen, and quick bounds on that for a whole ball.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
+#include "frontier_surfels/scoring/scene_object.hpp"
 #include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels::scoring {
@@ -26,12 +29,23 @@ class ExactView {
     return T_world_camera_ * Eigen::Vector3d((s - cx_) * z / fx_, (t - cy_) * z / fy_, z);
   }
 
-  /// Is the point between the camera and the end of what the pixel has seen to be free?
-  bool sees(const Eigen::Vector3d& p_world) const {
+  /// Is the point between the camera and the end of what the pixel has seen to be free, and has nothing been put there since?
+  bool sees(const Eigen::Vector3d& p_world) const { return saw(p_world) && !is_void(p_world); }
+
+  /// As sees(), at the time of the frame.
+  bool saw(const Eigen::Vector3d& p_world) const {
     double z;
     const float d = std::abs(measured_at(p_world, z));
     return d > 0 && z < d;
   }
+
+  /// Whether something stands at the point that was not there in this frame.
+  bool is_void(const Eigen::Vector3d& p_world) const {
+    return std::any_of(voids_.begin(), voids_.end(), [&](const OrientedBox& box) { return box.contains(p_world); });
+  }
+
+  /// Boxes of whose points the view says nothing, world.
+  void set_voids(std::vector<OrientedBox> voids) { voids_ = std::move(voids); }
 
   /// Is the point at or behind a measured surface, at most `thickness` [m] deep?
   bool sees_just_behind_surface(const Eigen::Vector3d& p_world, double thickness) const {
@@ -80,6 +94,7 @@ class ExactView {
   bool has_measurements_ = false;
   int tiles_per_row_ = 0;
   std::vector<Bounds> tiles_;
+  std::vector<OrientedBox> voids_;
 };
 
 }  // namespace frontier_surfels::scoring

@@ -74,6 +74,24 @@ Aim close_up(double share) {
   return between(kStations, share);
 }
 
+/// Three times from one end of the arc to the other, looking at the corner of the table where the box of some scenes stands.
+Aim arc(double share) {
+  const double angle = -M_PI / 4 - 75 * M_PI / 180 * std::cos(3 * M_PI * share);
+  Aim aim;
+  aim.p_world = {0.45 + 1.2 * std::cos(angle), -0.28 + 1.2 * std::sin(angle), 1.5 + 0.08 * std::sin(20 * share)};
+  aim.yaw = angle + M_PI + 0.1 * std::sin(25 * share);
+  aim.pitch = 0.45 + 0.08 * std::sin(30 * share);
+  return aim;
+}
+
+Aim watch(double share) {
+  Aim aim;
+  aim.p_world = {-0.4 + 0.1 * std::sin(14 * share), 0.9 + 0.3 * std::sin(4 * M_PI * share), 1.5};
+  aim.yaw = 0.08 + 0.3 * std::sin(8 * M_PI * share);
+  aim.pitch = 0.25;
+  return aim;
+}
+
 Aim aim_of(CameraPath path, int index, int frames) {
   const double share = static_cast<double>(index) / std::max(1, frames), angle = 2 * M_PI * share;
   switch (path) {
@@ -85,6 +103,10 @@ Aim aim_of(CameraPath path, int index, int frames) {
       return walk(share);
     case CameraPath::kClose:
       return close_up(share);
+    case CameraPath::kArc:
+      return arc(share);
+    case CameraPath::kWatch:
+      return watch(share);
     default:
       return orbit(angle);
   }

@@ -174,6 +174,38 @@ Rgb shaded(const Solid& solid, const Vector3d& p, const Vector3d& normal) {
   return rgb;
 }
 
+/// A box of a thing, at some time.
+struct PlacedSolid {
+  Solid solid;  ///< in its own frame, in which it is centred
+  Eigen::Isometry3d T_world_solid;
+};
+
+std::vector<PlacedSolid> placed_at(const std::vector<SceneThing>& things, int index) {
+  std::vector<PlacedSolid> placed;
+  for (const SceneThing& thing : things) {
+    const scoring::Stand* stand = thing.object.stand_at(static_cast<std::size_t>(index));
+    if (stand == nullptr) continue;
+    const auto boxes = thing.object.placed(*stand);
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+      placed.push_back({{Solid::Shape::kBox, Vector3d::Zero(), boxes[i].half_size, thing.rgb[i], 0}, boxes[i].T_frame_box});
+  }
+  return placed;
+}
+
+/// The first surface that the ray meets of the room, where `hit` is, and of the things.
+std::optional<RayHit> first_hit(std::optional<RayHit> hit, const std::vector<PlacedSolid>& things, const Vector3d& origin,
+                                const Vector3d& direction) {
+  for (const PlacedSolid& thing : things) {
+    const Eigen::Matrix3d to_solid = thing.T_world_solid.linear().transpose();
+    const Vector3d own_origin = to_solid * (origin - thing.T_world_solid.translation()), own_direction = to_solid * direction;
+    const double t = cast_box(thing.solid, own_origin, own_direction.cwiseInverse());
+    if (t >= (hit ? hit->distance : kNever)) continue;
+    const Vector3d normal = thing.T_world_solid.linear() * normal_at(thing.solid, own_origin + t * own_direction);
+    hit = RayHit{t, normal, shaded(thing.solid, origin + t * direction, normal)};
+  }
+  return hit;
+}
+
 struct View {
   RecordedFrame frame;    ///< depth CV_32FC1 [m]
   cv::Mat cos_incidence;  ///< CV_32FC1
@@ -182,17 +214,19 @@ struct View {
 View render_view(const Room& room, CameraPath path, int index, int frames, const Intrinsics& intrinsics) {
   const cv::Size size(intrinsics.width, intrinsics.height);
   View view{{}, cv::Mat::zeros(size, CV_32FC1)};
+  view.frame.index = static_cast<std::size_t>(index);
   view.frame.stamp = kFirstStamp + index / kFrameRate;
   view.frame.depth = cv::Mat::zeros(size, CV_32FC1);
   view.frame.color = cv::Mat::zeros(size, CV_8UC3);
   view.frame.intrinsics = intrinsics;
   view.frame.T_world_camera = camera_pose(path, index, frames);
+  const std::vector<PlacedSolid> things = placed_at(room.things(), index);
   const Vector3d origin = view.frame.T_world_camera.translation();
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
       const Vector3d ray((column - intrinsics.cx) / intrinsics.fx, (row - intrinsics.cy) / intrinsics.fy, 1);
       const Vector3d direction = view.frame.T_world_camera.linear() * ray;
-      const std::optional<RayHit> hit = room.cast(origin, direction);
+      const std::optional<RayHit> hit = first_hit(room.cast(origin, direction), things, origin, direction);
       if (!hit) continue;
       view.frame.depth.at<float>(row, column) = static_cast<float>(hit->distance);
       view.frame.color.at<cv::Vec3b>(row, column) = {hit->rgb[2], hit->rgb[1], hit->rgb[0]};
@@ -204,7 +238,7 @@ View render_view(const Room& room, CameraPath path, int index, int frames, const
 
 }  // namespace
 
-Room::Room() : solids_(shell()) {
+Room::Room(Scene scene, int frames) : solids_(shell()), things_(scene_things(scene, frames)) {
   append(solids_, table_and_chair());
   append(solids_, shelf());
   append(solids_, along_the_walls());
@@ -244,9 +278,15 @@ RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics, 
 }
 
 RecordedFrame Room::render(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor, CameraPath path) const {
-  View view = render_view(*this, path, index, frames, intrinsics);
-  view.frame.depth = measure(view.frame.depth, view.cos_incidence, sensor, index);
-  return view.frame;
+  return sense(index, frames, intrinsics, sensor, path).measured;
+}
+
+SensedFrame Room::sense(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor, CameraPath path) const {
+  const View view = render_view(*this, path, index, frames, intrinsics);
+  SensedFrame sensed{view.frame, view.frame};
+  sensed.measured.depth = measure(view.frame.depth, view.cos_incidence, sensor, index);
+  sensed.measured.T_world_camera = tracked(view.frame.T_world_camera, sensor, index);
+  return sensed;
 }
 
 Eigen::Isometry3d orbit_pose(int index, int frames) { return camera_pose(CameraPath::kOrbit, index, frames); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace frontier_surfels::replay {
 namespace {
@@ -13,13 +14,18 @@ constexpr double kJump = 0.04;                 // smallest relative step of dept
 constexpr double kLostAtEdges = 0.7;           // share of pixels
 constexpr double kSmallestBlob = 2.0 / 640.0;  // radius over image width
 constexpr double kLargestBlob = 16.0 / 640.0;
+constexpr double kNearestOutlier = 0.5, kFarthestOutlier = 3;  // [m] the default range of the mapper, so that all outliers count
 
-/// Mixes a seed and a frame index (splitmix64). Similar seeds would give similar first numbers of cv::RNG.
-std::uint64_t stirred(std::uint64_t seed, int index) {
-  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(index) + 1;
+// Each kind of error has random numbers of its own, so that one does not change another.
+constexpr std::uint64_t kNoiseStream = 0, kOutlierStream = 1, kFlyingStream = 2, kPoseStream = 3;
+
+/// The random numbers of one kind of error in one frame. Seed, frame and kind are mixed (splitmix64), because similar seeds would give
+/// similar first numbers.
+cv::RNG random_numbers(std::uint64_t seed, int index, std::uint64_t stream) {
+  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(index) + 1 + (stream << 32);
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
+  return cv::RNG(z ^ (z >> 31));
 }
 
 void add_noise(cv::Mat& depth, cv::RNG& random) {
@@ -31,6 +37,41 @@ void add_noise(cv::Mat& depth, cv::RNG& random) {
 }
 
 bool is_jump(float a, float b) { return std::abs(a - b) > kJump * std::min(a, b); }
+
+/// The smallest and the largest depth of a pixel and the four beside it, without those that have none.
+std::pair<float, float> depths_around(const cv::Mat& depth, int row, int column) {
+  float near = depth.at<float>(row, column), far = near;
+  const auto add = [&](int other_row, int other_column) {
+    if (other_row < 0 || other_row >= depth.rows || other_column < 0 || other_column >= depth.cols) return;
+    const float z = depth.at<float>(other_row, other_column);
+    if (!(z > 0)) return;
+    near = std::min(near, z);
+    far = std::max(far, z);
+  };
+  add(row - 1, column);
+  add(row + 1, column);
+  add(row, column - 1);
+  add(row, column + 1);
+  return {near, far};
+}
+
+/// Mixes foreground and background in the pixels beside an edge, with random weights.
+void mix_edges(cv::Mat& depth, cv::RNG& random) {
+  const cv::Mat before = depth.clone();
+  for (int row = 0; row < depth.rows; ++row) {
+    for (int column = 0; column < depth.cols; ++column) {
+      const auto [near, far] = depths_around(before, row, column);
+      if (!(near > 0) || !is_jump(near, far)) continue;
+      depth.at<float>(row, column) = near + static_cast<float>(random.uniform(0.0, 1.0)) * (far - near);
+    }
+  }
+}
+
+void add_outliers(cv::Mat& depth, double share, cv::RNG& random) {
+  std::for_each(depth.begin<float>(), depth.end<float>(), [&](float& z) {
+    if (random.uniform(0.0, 1.0) < share) z = static_cast<float>(random.uniform(kNearestOutlier, kFarthestOutlier));
+  });
+}
 
 void drop_edges(cv::Mat& depth, const cv::Mat& cos_incidence, cv::RNG& random) {
   const cv::Mat before = depth.clone();
@@ -71,17 +112,52 @@ void drop_blobs(cv::Mat& depth, double share, cv::RNG& random) {
 }  // namespace
 
 cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index) {
-  cv::RNG random(stirred(sensor.seed, index));
   cv::Mat measured = depth.clone();
+  if (sensor.flying) {
+    cv::RNG random = random_numbers(sensor.seed, index, kFlyingStream);
+    mix_edges(measured, random);
+  }
+  cv::RNG random = random_numbers(sensor.seed, index, kNoiseStream);
   if (sensor.noise) add_noise(measured, random);
   if (sensor.dropouts > 0) {
     drop_edges(measured, cos_incidence, random);
     drop_blobs(measured, sensor.dropouts, random);
   }
+  if (sensor.outliers > 0) {
+    cv::RNG outliers = random_numbers(sensor.seed, index, kOutlierStream);
+    add_outliers(measured, sensor.outliers, outliers);
+  }
   cv::Mat millimetres(depth.size(), CV_16UC1);
   std::transform(measured.begin<float>(), measured.end<float>(), millimetres.begin<std::uint16_t>(),
                  [](float z) { return z < 65.535f ? static_cast<std::uint16_t>(std::lround(z * 1000)) : 0; });
   return millimetres;
+}
+
+SensedFrame spoilt(const RecordedFrame& frame, const SensorModel& sensor, int index) {
+  SensedFrame sensed{frame, frame};
+  sensed.ideal.index = sensed.measured.index = static_cast<std::size_t>(index);
+  if (frame.depth.type() == CV_16UC1) {
+    sensed.ideal.depth = cv::Mat(frame.depth.size(), CV_32FC1);
+    std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), sensed.ideal.depth.begin<float>(),
+                   [](std::uint16_t z) { return z == 65535 ? 0 : static_cast<float>(z * 1e-3); });
+  }
+  sensed.measured.depth = measure(sensed.ideal.depth, cv::Mat::ones(frame.depth.size(), CV_32FC1), sensor, index);
+  sensed.measured.T_world_camera = tracked(frame.T_world_camera, sensor, index);
+  return sensed;
+}
+
+Eigen::Isometry3d tracked(const Eigen::Isometry3d& T_world_camera, const SensorModel& sensor, int index) {
+  if (sensor.position_noise == 0 && sensor.rotation_noise == 0) return T_world_camera;
+  cv::RNG random = random_numbers(sensor.seed, index, kPoseStream);
+  const auto gaussian = [&](double deviation) {
+    const double x = random.gaussian(deviation), y = random.gaussian(deviation);
+    return Eigen::Vector3d(x, y, random.gaussian(deviation));
+  };
+  const Eigen::Vector3d shift = gaussian(sensor.position_noise), turn = gaussian(sensor.rotation_noise);
+  Eigen::Isometry3d tracked = T_world_camera;
+  tracked.translation() += shift;
+  if (turn.norm() > 0) tracked.rotate(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+  return tracked;
 }
 
 }  // namespace frontier_surfels::replay

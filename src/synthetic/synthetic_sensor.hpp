@@ -13,4 +13,11 @@ namespace frontier_surfels::replay {
 /// @return               CV_16UC1 [mm]; 0: no measurement
 cv::Mat measure(const cv::Mat& depth, const cv::Mat& cos_incidence, const SensorModel& sensor, int index);
 
+/// The pose that a tracker with errors would give.
+Eigen::Isometry3d tracked(const Eigen::Isometry3d& T_world_camera, const SensorModel& sensor, int index);
+
+/// A recorded frame as an ideal sensor would have seen it, and with errors on top of those that it has. Depth of 16 bits is in mm.
+/// @param index  place in the new recording
+SensedFrame spoilt(const RecordedFrame& frame, const SensorModel& sensor, int index);
+
 }  // namespace frontier_surfels::replay

@@ -115,12 +115,14 @@ class LaunchFiles(unittest.TestCase):
 
     def test_replay(self):
         report = os.path.join(self.folder, 'report')
-        result = self.launch('replay.launch', 'report:=' + report, 'options:=--octomap-resolution 0 --no-exact')
+        truth = os.path.join(self.folder, 'room', 'truth')
+        result = self.launch('replay.launch', 'report:=' + report, f'options:=--octomap-resolution 0 --no-exact --truth {truth}')
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         with open(os.path.join(report, 'summary.json'), encoding='utf-8') as file:
             summary = json.load(file)
         self.assertEqual(summary['input']['frames'], FRAMES)
         self.assertGreater(summary['surfels']['total'], 1000)
+        self.assertGreater(summary['truth']['right'], 0.95)
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))
 
     def test_live_replay_leaves_map_folders_alone(self):

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/scoring/scene_object.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
@@ -35,6 +36,12 @@ struct BoundaryPoint {
   bool occupied = false;     ///< 3 mm further on a frame sees it at most 3 cm behind its measured surface
 };
 
+/// Something that was put down: what earlier frames have seen in its place does not count.
+struct PlacedBox {
+  OrientedBox box_world;
+  std::size_t frames_before = 0;  ///< how many frames had been added before it stood there
+};
+
 class ExactView;  // what one frame has seen; private
 
 class ExactTest {
@@ -54,14 +61,17 @@ class ExactTest {
   void add(const DepthFrame& frame);
   std::size_t size() const;
 
+  /// Says what has been put down, in place of what was said before. Without any, the world is taken to be still.
+  void set_placed(const std::vector<PlacedBox>& placed);
+
   /// known(p) <=> there is a frame m and its pixel q = round(pi(T_m^-1 p)) inside the image that has seen free space up to d, and
-  /// 0 < z(T_m^-1 p) < d. Where z_min <= depth <= z_max, d is the depth. Where the depth is beyond z_max and the configuration carves such
-  /// pixels, d is z_max. Other pixels have seen nothing.
+  /// 0 < z(T_m^-1 p) < d, and nothing was put down at p after it. Where z_min <= depth <= z_max, d is the depth. Where the depth is beyond
+  /// z_max and the configuration carves such pixels, d is z_max. Other pixels have seen nothing.
   bool known(const Eigen::Vector3d& p_world) const;
 
   /// `segments` random rays: a random frame and valid pixel, a point at 2-98 % of its depth, a random direction; marched in 1 cm steps
-  /// until not known (at most 2 z_max), bisected; dropped if any of the next four 5 mm steps is known again. The same seed gives the same
-  /// points.
+  /// until not known (at most 2 z_max), bisected; dropped if any of the next four 5 mm steps is known again, and on faces of
+  /// what was put down that no frame has seen since. The same seed gives the same points.
   /// @param threads  0: as many as the machine has; the points do not depend on it
   std::vector<BoundaryPoint> boundary(std::size_t segments, std::uint64_t seed, int threads = 0) const;
 
