@@ -84,7 +84,7 @@ struct Mapper::Impl {
   void finish_frame(std::uint32_t number, Report& report);
   Changes changes(std::uint64_t since);
   SavedMap saved_map();
-  void begin_map(const SavedMap& saved);
+  void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
   void load_views(const std::vector<SavedView>& saved);
   std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
 
@@ -334,24 +334,26 @@ void Mapper::load(const std::string& path) {
   }
 }
 
-void Mapper::load(const std::vector<Surfel>& surfels) { load(SavedMap{surfels, {}, {}}); }
-
-void Mapper::load(const SavedMap& map) {
-  on_device([&] { impl_->begin_map(map); });
+void Mapper::load(const std::vector<Surfel>& surfels) {
+  on_device([&] { impl_->begin_map(surfels, {}, {}); });
 }
 
-void Mapper::Impl::begin_map(const SavedMap& saved) {
+void Mapper::load(const SavedMap& map) {
+  on_device([&] { impl_->begin_map(map.surfels, map.seen, map.views); });
+}
+
+void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views) {
   commands.forget_times();
-  SurfelMap::check(saved.surfels);
-  for (const SavedView& view : saved.views) check_view(view);
-  views.make_room(saved.views);
-  const SeenSpace has_seen = config.seen_points ? seen_of(saved, map.block_size(), config.threads) : SeenSpace();
-  map.replace(saved.surfels, static_cast<std::uint32_t>(sequence + 1));
+  SurfelMap::check(surfels);
+  for (const SavedView& view : saved_views) check_view(view);
+  views.make_room(saved_views);
+  const SeenSpace has_seen = config.seen_points ? seen_of(surfels, saved_seen, map.block_size(), config.threads) : SeenSpace();
+  map.replace(surfels, static_cast<std::uint32_t>(sequence + 1));
   map.set_lost(true);  // until all that belongs to it is there
   views.clear(map.size() == 0);
   seen.clear();
   if (config.seen_points) seen.load(has_seen);
-  load_views(saved.views);
+  load_views(saved_views);
   map.set_lost(false);
   ++sequence;
   if (!archive) return;
@@ -373,7 +375,7 @@ void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
 }
 
 void Mapper::reset() {
-  on_device([&] { impl_->begin_map(SavedMap()); });
+  on_device([&] { impl_->begin_map({}, {}, {}); });
 }
 
 Statistics Mapper::statistics() const {

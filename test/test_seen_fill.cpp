@@ -252,7 +252,7 @@ TEST(SeenFill, MissingMemoryIsToldAndTheMapStays) {
   const SavedMap map = {balls(2, 4), {}, {}};
   const Config config;
   watch(-1);
-  seen_of(map, kBlock, config.threads);
+  seen_of(map.surfels, map.seen, kBlock, config.threads);
   stop();
   const long count = allocations;
   const auto mapper = mapper_of(balls(1, 5), config);

@@ -265,17 +265,17 @@ int shift_for(const std::vector<Surfel>& surfels, double block_size) {
   return SeenPoints::shift_for_spacing(block_size, kSeenSpacing * voxel);
 }
 
-SeenSpace seen_of(const SavedMap& map, double block_size, int threads) {
-  if (map.seen.points != 0 && map.seen.block_size == block_size) {
-    SeenPoints::check(map.seen);
-    return map.seen;
+SeenSpace seen_of(const std::vector<Surfel>& surfels, const SeenSpace& saved, double block_size, int threads) {
+  if (saved.points != 0 && saved.block_size == block_size) {
+    SeenPoints::check(saved);
+    return saved;
   }
   const auto cannot = [&](const char* reason) {
-    return Error("What has been seen cannot be filled in for " + std::to_string(map.surfels.size()) + " surfels, because " + reason +
+    return Error("What has been seen cannot be filled in for " + std::to_string(surfels.size()) + " surfels, because " + reason +
                  ": end other programs, or load a map that was saved with what has been seen.");
   };
   try {
-    return fill_seen(map.surfels, block_size, shift_for(map.surfels, block_size), threads);
+    return fill_seen(surfels, block_size, shift_for(surfels, block_size), threads);
   } catch (const std::bad_alloc&) {
     throw cannot("there is not enough memory");
   } catch (const std::system_error&) {

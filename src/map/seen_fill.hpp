@@ -19,8 +19,8 @@ SeenSpace fill_seen(const std::vector<Surfel>& surfels, double block_size, int s
 /// A shift for fill_seen(): its points are as far apart as those of a mapper that makes surfels of these sizes.
 int shift_for(const std::vector<Surfel>& surfels, double block_size);
 
-/// What has been seen of a saved map; filled in where the map does not have it, or with blocks of another size.
+/// What has been seen of a map; filled in where it was not saved with the map, or with blocks of another size.
 /// @throws FileError  it is damaged. @throws Error  memory or threads are missing to fill it in
-SeenSpace seen_of(const SavedMap& map, double block_size, int threads);
+SeenSpace seen_of(const std::vector<Surfel>& surfels, const SeenSpace& saved, double block_size, int threads);
 
 }  // namespace frontier_surfels
