@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "frontier_surfels/map_file.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 
@@ -60,13 +61,6 @@ std::string file_fault(const Action& action) {
 class MapFileFolder : public testing::Test {
  protected:
   explicit MapFileFolder(const std::string& ending) : ending_(ending) {}
-  void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "map_file_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    path_ = (folder_ / ("map" + ending_)).string();
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::size_t files() const { return std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator()); }
 
@@ -85,8 +79,9 @@ class MapFileFolder : public testing::Test {
   }
 
   std::string ending_;
-  std::filesystem::path folder_;
-  std::string path_;
+  const TemporaryFolder temporary_{"map_file"};
+  const std::filesystem::path folder_ = temporary_.path();
+  std::string path_ = (folder_ / ("map" + ending_)).string();
 };
 
 }  // namespace frontier_surfels

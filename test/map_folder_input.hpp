@@ -12,6 +12,7 @@
 
 #include "frontier_surfels/types.hpp"
 #include "storage/map_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 
@@ -50,22 +51,15 @@ inline testing::AssertionResult says(const std::string& said, const std::string&
 
 class MapFolders : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "map_folder_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-    path_ = (root_ / "maps" / "kitchen").string();
-    file_ = std::filesystem::path(path_) / "map.sqlite";
-  }
-  void TearDown() override { std::filesystem::remove_all(root_); }
-
   std::string fault_of_opening(const std::string& path, double block_size = kBlockSize) {
     return fault_of([&] { MapFolder(path, block_size); });
   }
 
   std::mt19937 random_{1};
-  std::filesystem::path root_, file_;
-  std::string path_;
+  const TemporaryFolder temporary_{"map_folder"};
+  const std::filesystem::path root_ = temporary_.path();
+  std::string path_ = (root_ / "maps" / "kitchen").string();
+  const std::filesystem::path file_ = std::filesystem::path(path_) / "map.sqlite";
 };
 
 }  // namespace frontier_surfels

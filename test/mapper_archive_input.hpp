@@ -13,6 +13,7 @@
 #include "mapper_input.hpp"
 #include "storage/map_folder.hpp"
 #include "storage/stored_block.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 
@@ -67,14 +68,6 @@ inline std::vector<Surfel> sorted(std::vector<Surfel> surfels) {
 /// Gives each test its own folder.
 class MapperArchive : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "mapper_archive_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-    path_ = (root_ / "map").string();
-  }
-  void TearDown() override { std::filesystem::remove_all(root_); }
-
   /// All surfels of a mapper, in memory and on disk, by saving and reading a file.
   std::vector<Surfel> saved(const Mapper& mapper) const {
     const std::string file = (root_ / "saved.ply").string();
@@ -99,8 +92,9 @@ class MapperArchive : public testing::Test {
     SQLite::Database((std::filesystem::path(path_) / "map.sqlite").string(), SQLite::OPEN_READWRITE).exec(sql);
   }
 
-  std::filesystem::path root_;
-  std::string path_;
+  const TemporaryFolder temporary_{"mapper_archive"};
+  const std::filesystem::path root_ = temporary_.path();
+  std::string path_ = (root_ / "map").string();
 };
 
 }  // namespace frontier_surfels

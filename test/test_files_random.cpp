@@ -14,14 +14,8 @@ constexpr int kUsual = 5000;
 class DamagedFiles : public MapFileFolder {
  protected:
   DamagedFiles() : MapFileFolder("") {}
-  void SetUp() override {
-    MapFileFolder::SetUp();
-    limit_memory(true);  // a header may promise more surfels than fit
-  }
-  void TearDown() override {
-    limit_memory(false);
-    MapFileFolder::TearDown();
-  }
+  void SetUp() override { limit_memory(true); }  // a header may promise more surfels than fit
+  void TearDown() override { limit_memory(false); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 

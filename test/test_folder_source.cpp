@@ -1,16 +1,17 @@
 /// Reading of folders: both layouts, every fault, and the recorded sequences if they are there.
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
 #include "recordings/frame_source.hpp"
+#include "temporary_folder.hpp"
 
 namespace fs = std::filesystem;
 using frontier_surfels::DepthFrame;
 using frontier_surfels::Error;
+using frontier_surfels::TemporaryFolder;
 using frontier_surfels::replay::FrameSource;
 using frontier_surfels::replay::open_source;
 using frontier_surfels::replay::RecordedFrame;
@@ -50,13 +51,6 @@ SourceOptions part(int first, int last = -1, int stride = 1) {
 /// A folder that is removed after the test.
 class FolderTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "folder_source_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   void write_text(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
 
   /// An image of 4 x 3 pixels with the values `value`, `value` + 1, ...
@@ -86,7 +80,8 @@ class FolderTest : public testing::Test {
 
   std::unique_ptr<FrameSource> open(const SourceOptions& options = {}) const { return open_source(folder_.string(), options); }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_{"folder_source"};
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(FolderTest, ReadsImagesPosesAndCamera) {

@@ -1,6 +1,5 @@
 /// Recordings in folders with bytes damaged at random: never a crash, always frames or a sentence.
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <opencv2/core/utils/logger.hpp>
@@ -8,6 +7,7 @@
 
 #include "random_bytes.hpp"
 #include "recordings/frame_source.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -19,9 +19,6 @@ class DamagedFolder : public testing::Test {
  protected:
   void SetUp() override {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    std::string pattern = (fs::temp_directory_path() / "damaged_folder_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
     fs::create_directories(folder_ / "depth");
     fs::create_directories(folder_ / "color");
     cv::Mat depth(24, 32, CV_16UC1), color(24, 32, CV_8UC3);
@@ -42,7 +39,6 @@ class DamagedFolder : public testing::Test {
     write_bytes(path("rgb.txt"), colors);
     write_bytes(path("camera.txt"), "525.5 525.25 15.5 11.5 32 24\n");
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
@@ -69,7 +65,8 @@ class DamagedFolder : public testing::Test {
     }
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_{"damaged_folder"};
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(DamagedFolder, PosesAndCamera) { read_damaged({"poses.txt", "camera.txt"}, 2000); }

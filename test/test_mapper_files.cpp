@@ -11,6 +11,7 @@
 
 #include "frontier_surfels/map_file.hpp"
 #include "mapper_input.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -44,15 +45,10 @@ std::string bytes_of(const std::string& path) {
 class MapperFiles : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "maps_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    path_ = (folder_ / "map.ply").string();
     integrate_all(mapper_, frames_);
     surfels_ = mapper_.surfels();
     ASSERT_GT(surfels_.size(), 10000u);
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   std::size_t files() const { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator()); }
 
@@ -67,8 +63,9 @@ class MapperFiles : public testing::Test {
   Frames frames_ = orbit_frames(coarse_camera(), 3, 6);
   Mapper mapper_{undecimated()};
   std::vector<Surfel> surfels_;
-  fs::path folder_;
-  std::string path_;
+  const TemporaryFolder temporary_{"maps"};
+  const fs::path folder_ = temporary_.path();
+  const std::string path_ = (folder_ / "map.ply").string();
 };
 
 TEST_F(MapperFiles, ASavedMapComesBack) {

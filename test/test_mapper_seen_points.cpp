@@ -91,7 +91,6 @@ class SavedInTheMiddle : public MapperArchive {
   Mapper whole_{few_views(6)}, half_{few_views(6)};
 
   void SetUp() override {
-    MapperArchive::SetUp();
     integrate_all(whole_, frames_);
     integrate_all(half_, first_);
   }

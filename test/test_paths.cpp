@@ -6,6 +6,7 @@
 
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/paths.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -54,15 +55,14 @@ TEST_F(Paths, WithoutHomeTheAccountDecides) {
 }
 
 TEST_F(Paths, TheMapFolderOfAMapperMayBeginWithATilde) {
-  std::string folder = (std::filesystem::temp_directory_path() / "home_XXXXXX").string();
-  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const TemporaryFolder temporary("home");
+  const std::string folder = temporary.path().string();
   setenv("HOME", folder.c_str(), 1);
   Config config;
   config.map_folder = "~/map";
   EXPECT_EQ(Mapper(config).config().map_folder, folder + "/map");
   EXPECT_TRUE(std::filesystem::is_directory(folder + "/map"));
   EXPECT_FALSE(std::filesystem::exists("/tmp/~"));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

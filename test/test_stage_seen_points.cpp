@@ -2,9 +2,6 @@
 /// with the sum over the eight points around it.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
 
 #include "map/seen_block.hpp"
 #include "stages/frame_fixture.hpp"
@@ -13,6 +10,7 @@
 #include "stages/seen_bits.hpp"
 #include "stages/view_settling.hpp"
 #include "storage/map_archive.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -235,10 +233,9 @@ TEST_F(SeenPointsTest, PointsInABoxAreForgottenOnDisk) {
     remembering_->remember(*fixture_->views().forgotten(), fixture_->views(), block_size, seen);
     const SeenBits last(seen.saved());  // of the last view alone, which sees a part of the box again
     seen.load(saved);
-    std::string folder = (std::filesystem::temp_directory_path() / "seen_points_XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
+    const TemporaryFolder folder("seen_points");
     Config config = camera_.config;
-    config.map_folder = folder;
+    config.map_folder = folder.path().string();
     config.eviction_radius = in_memory;
     const auto open = [&] {
       return std::make_unique<MapArchive>(config, fixture_->map(), seen, fixture_->views(), [] { return std::vector<BlockKey>(); });
@@ -267,7 +264,6 @@ TEST_F(SeenPointsTest, PointsInABoxAreForgottenOnDisk) {
       expect_forgotten(before, box, all(*archive), last);
     }
     expect_forgotten(before, box, all(*open()), last);
-    std::filesystem::remove_all(folder);
   }
 }
 

@@ -1,6 +1,5 @@
 /// The folder of ideal frames: objects.json, every mismatch with the recording, and what it says of a world that changes.
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
@@ -11,6 +10,7 @@
 #include "recordings/truth_folder.hpp"
 #include "replay/truth.hpp"
 #include "synthetic/synthetic_room.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels::replay {
 namespace {
@@ -30,13 +30,6 @@ Config working_size() {
 /// A folder that is removed after the test.
 class TruthTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "truth_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path recording() const { return folder_ / "recording"; }
   fs::path truth() const { return folder_ / "truth"; }
 
@@ -72,7 +65,8 @@ class TruthTest : public testing::Test {
     return {};
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_{"truth"};
+  const fs::path folder_ = temporary_.path();
 };
 
 testing::AssertionResult says(const std::string& sentence, const std::string& part) {
@@ -225,7 +219,7 @@ TEST_F(TruthTest, TheWorldIsThatOfTheLastFrame) {
        {Case{Scene::kBoxAppears, 60, 1, false}, Case{Scene::kBoxAppears, 60, 7, false}, Case{Scene::kBoxAppears, 25, 1, true},
         Case{Scene::kBoxVanishes, 60, 1, true}, Case{Scene::kBoxVanishes, 25, 1, false}, Case{Scene::kBoxReturns, 60, 1, false},
         Case{Scene::kBoxReturns, 39, 1, true}}) {
-    TearDown();
+    for (const fs::path& earlier : {recording(), truth()}) fs::remove_all(earlier);
     write(test.scene, {}, 60);
     Truth judge(working_size(), std::make_shared<TruthFolder>(truth().string(), recording().string()));
     SourceOptions selection;

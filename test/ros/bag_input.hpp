@@ -5,7 +5,6 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
-#include <stdlib.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <cstdint>
@@ -19,6 +18,7 @@
 
 #include "recordings/frame_source.hpp"
 #include "ros/input/conversions.hpp"
+#include "temporary_folder.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -39,14 +39,6 @@ inline bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
 /// A folder for bags that is removed after the test.
 class BagTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "bag_source_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    path_ = (folder_ / "test.bag").string();
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string failure(const SourceOptions& options = {}) const {
     try {
       open_source(path_, options);
@@ -56,8 +48,9 @@ class BagTest : public testing::Test {
     return {};
   }
 
-  fs::path folder_;
-  std::string path_;
+  const TemporaryFolder temporary_{"bag_source"};
+  const fs::path folder_ = temporary_.path();
+  std::string path_ = (folder_ / "test.bag").string();
 };
 
 /// Size of every image made here [pixel].
