@@ -1,6 +1,6 @@
 /// Surfels as PLY files: binary little endian, vertex properties x y z nx ny nz radius (float), red green blue label (uchar; 1 occupied, 0
-/// frontier). What has been seen and the kept views may follow as an element `seen` of bytes, which other programs
-/// pass over: this program's own format, which only read_saved_ply() reads.
+/// frontier). What has been seen and the kept views may follow as an element `seen` of bytes, which other programs pass over and which
+/// only read_saved_ply() reads.
 #pragma once
 
 #include <string>

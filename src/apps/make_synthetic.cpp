@@ -173,8 +173,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app(
       "Writes a synthetic sequence of depth and colour images with poses: depth/, color/, poses.txt, camera.txt. What an ideal sensor "
-      "would "
-      "have seen goes to truth/, for replay_score --truth: depth in floats, true poses, and in scenes with things that come and go "
+      "would have seen goes to truth/, for replay_score --truth: depth in floats, true poses, and in scenes with things that come and go "
       "objects.json, which says what stands where.",
       "make_synthetic");
   app.option_defaults()->always_capture_default();

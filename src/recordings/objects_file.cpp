@@ -1,11 +1,11 @@
 #include "recordings/objects_file.hpp"
 
 #include <array>
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "frontier_surfels/types.hpp"
+#include "recordings/folder_source.hpp"
 
 namespace frontier_surfels::replay {
 
@@ -16,8 +16,6 @@ using scoring::Stand;
 
 namespace {
 
-constexpr double kQuaternionTolerance = 1e-2;  // largest difference of the norm from 1 that can be rounding
-
 /// A fault of one object; the caller adds the name of the file.
 void refuse_if(bool wrong, const std::string& object, const char* fault) {
   if (wrong) throw Error("the object '" + object + "' " + fault);
@@ -25,11 +23,12 @@ void refuse_if(bool wrong, const std::string& object, const char* fault) {
 
 Eigen::Isometry3d pose_of(const ordered_json& json, const std::string& object) {
   const auto numbers = json.at("pose").get<std::array<double, 7>>();
-  const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
-  const Eigen::Vector3d position(numbers[0], numbers[1], numbers[2]);
-  refuse_if(!(std::abs(rotation.norm() - 1) <= kQuaternionTolerance) || !position.allFinite(), object,
-            "has a pose that is none: it must be [tx, ty, tz, qx, qy, qz, qw] with a quaternion of length 1");
-  return Eigen::Translation3d(position) * rotation.normalized();
+  try {
+    return to_pose({numbers.begin(), numbers.end()});
+  } catch (const BadFrame&) {
+    throw Error("the object '" + object +
+                "' has a pose that is none: it must be [tx, ty, tz, qx, qy, qz, qw] with a quaternion of length 1");
+  }
 }
 
 ordered_json pose_json(const Eigen::Isometry3d& pose) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "frame/depth_pixels.hpp"
+
 namespace frontier_surfels::replay {
 namespace {
 
@@ -139,7 +141,7 @@ SensedFrame spoilt(const RecordedFrame& frame, const SensorModel& sensor, int in
   if (frame.depth.type() == CV_16UC1) {
     sensed.ideal.depth = cv::Mat(frame.depth.size(), CV_32FC1);
     std::transform(frame.depth.begin<std::uint16_t>(), frame.depth.end<std::uint16_t>(), sensed.ideal.depth.begin<float>(),
-                   [](std::uint16_t z) { return z == 65535 ? 0 : static_cast<float>(z * 1e-3); });
+                   [](std::uint16_t millimetres) { return to_metres(millimetres, 1e-3); });
   }
   sensed.measured.depth = measure(sensed.ideal.depth, cv::Mat::ones(frame.depth.size(), CV_32FC1), sensor, index);
   sensed.measured.T_world_camera = tracked(frame.T_world_camera, sensor, index);
