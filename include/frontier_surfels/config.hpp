@@ -17,11 +17,18 @@ struct Config {
   // Working image and grid (paper 3.1)
   double depth_unit = 0.001;
   int decimation = 4;
+  std::string sampling = "mean";
   double z_min = 0.5;
   double z_max = 3.0;
   int padding_i = 5;
   int padding_j = 5;
   int padding_k = 2;
+
+  // Sensor (ours)
+  double noise = 0;
+  double noise_growth = 0.0015;
+  double quantisation = 0.003;
+  double agreement = 0.03;
 
   // Observed space (paper 3.3)
   bool carve_no_return = false;
@@ -85,12 +92,27 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"depth_unit", "m", "one step of a 16-bit depth image; images of 32 bits and folders in TUM's layout are in metres anyway",
                   1e-6, 1},
         config.depth_unit);
-  field(FieldInfo{"decimation", "pixel", "only every n-th column and row of the depth image is used", 1, 64}, config.decimation);
+  field(FieldInfo{"decimation", "pixel", "the working image has every n-th column and row of the depth image", 1, 64}, config.decimation);
+  field(FieldInfo{"sampling", "",
+                  "a depth of the working image is the mean of the pixels around it that measure the same surface, or that of the nearest "
+                  "pixel: mean or nearest"},
+        config.sampling);
   field(FieldInfo{"z_min", "m", "smallest depth that is used; nearer measurements are ignored", 0.01, 100}, config.z_min);
   field(FieldInfo{"z_max", "m", "depth up to which space is mapped", 0.02, 1000}, config.z_max);
   field(FieldInfo{"padding_i", "voxel", "width of the grid beyond the left and right edges of the image", 1, 64}, config.padding_i);
   field(FieldInfo{"padding_j", "voxel", "height of the grid beyond the upper and lower edges of the image", 1, 64}, config.padding_j);
   field(FieldInfo{"padding_k", "voxel", "depth of the grid behind the camera", 1, 64}, config.padding_k);
+
+  group = "Sensor";
+  field(FieldInfo{"noise", "m", "standard deviation of a pixel's depth at z = 0: it is noise + noise_growth z^2", 0, 1}, config.noise);
+  field(FieldInfo{"noise_growth", "1/m", "growth of a pixel's standard deviation with the square of its depth", 0, 1}, config.noise_growth);
+  field(FieldInfo{"quantisation", "1/m", "step between two depths at 1 m; it grows with the square of the depth", 0, 1},
+        config.quantisation);
+  field(FieldInfo{"agreement", "",
+                  "with sampling: mean, pixels around a pixel measure the same surface if their depths differ by at most this share, or by "
+                  "three standard deviations and a step",
+                  0.001, 0.5},
+        config.agreement);
 
   group = "Observed space";
   field(FieldInfo{"carve_no_return", "", "whether a depth of +Inf means that space is free up to z_max"}, config.carve_no_return);

@@ -116,6 +116,7 @@ std::vector<std::string> Config::problems() const {
     faults.push_back("eviction_radius is " + to_text(eviction_radius) + " m: it must be at least three times z_max, which is " +
                      to_text(z_max) + " m.");
   }
+  if (sampling != "mean" && sampling != "nearest") faults.push_back("sampling is '" + sampling + "': it must be mean or nearest.");
   if (device_type != "any" && device_type != "cpu" && device_type != "gpu" && device_type != "accelerator") {
     faults.push_back("device_type is '" + device_type + "': it must be any, cpu, gpu or accelerator.");
   }

@@ -1,9 +1,13 @@
 #include "frame/working_image.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "frame/depth_pixels.hpp"
+#include "frame/sampling.hpp"
 #include "frame/view_grid.hpp"
 #include "frontier_surfels/number_text.hpp"
 
@@ -55,33 +59,115 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
-/// Meaning of a raw depth [m]: > 0 a surface at this depth, < 0 free space up to its magnitude, 0 no measurement.
-float interpret(float d, const Config& config) {
-  const float z_max = static_cast<float>(config.z_max);
-  if (std::isnan(d) || d < static_cast<float>(config.z_min)) return 0;
-  if (d <= z_max) return d;
-  return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
-}
-
-/// Depths of every decimation-th pixel in both directions [m]. @tparam Pixel  unsigned integer of the image's pixel size
-template <typename Pixel>
-std::vector<float> read_depth(const DepthImage& image, int width, int height, const Config& config) {
+/// Depths of every decimation-th pixel in both directions, as interpret() says.
+std::vector<float> read_depth(const DepthImage& image, const Config& config) {
+  const int step = config.decimation;
   std::vector<float> depth;
-  depth.reserve(static_cast<std::size_t>(width) * height);
-  for_each_pixel<Pixel>(image, config.decimation,
-                        [&](Pixel pixel) { depth.push_back(interpret(to_metres(pixel, config.depth_unit), config)); });
+  depth.reserve(static_cast<std::size_t>(image.width / step) * (image.height / step));
+  const auto read = [&](auto pixel) { depth.push_back(interpret(to_metres(pixel, config.depth_unit), config)); };
+  if (image.encoding == DepthImage::Encoding::kStepsU16)
+    for_each_pixel<std::uint16_t>(image, step, read);
+  else
+    for_each_pixel<std::uint32_t>(image, step, read);
   return depth;
 }
 
-std::vector<std::uint32_t> read_color(const ColorImage& image, int width, int height, int step) {
+/// Red, green and blue of a pixel.
+std::array<std::uint32_t, 3> read_color(const ColorImage& image, int column, int row) {
+  const std::uint8_t* pixel = image.data + row * image.step + column * image.channels;
   const int red = image.order == ColorImage::Order::kRgb ? 0 : 2;
-  std::vector<std::uint32_t> color;
-  color.reserve(static_cast<std::size_t>(width) * height);
-  for (int t = 0; t < height; ++t) {
-    const std::uint8_t* pixel = image.data + t * step * image.step;
-    for (int s = 0; s < width; ++s, pixel += step * image.channels) color.push_back(pixel[red] | pixel[1] << 8 | pixel[2 - red] << 16);
+  return {pixel[red], pixel[1], pixel[2 - red]};
+}
+
+std::uint32_t packed(const std::array<std::uint32_t, 3>& rgb) { return rgb[0] | rgb[1] << 8 | rgb[2] << 16; }
+
+using Sums = std::array<std::uint32_t, 3>;
+
+std::uint32_t packed_mean(const Sums& sum, std::uint32_t count) {
+  const auto mean = [&](int channel) { return (sum[channel] + count / 2) / count; };
+  return packed({mean(0), mean(1), mean(2)});
+}
+
+/// Colours of blocks: the mean of the pixels that measure the block's surface.
+class MeanColors {
+ public:
+  MeanColors(const ColorImage& color, const DepthPlanes& planes, const Sampling& sampling, const Config& config)
+      : color_(color), planes_(planes), sampling_(sampling), decimation_(config.decimation), of_columns_(color.width * color.channels) {}
+
+  void append_row(int t, const SampledDepth& sampled, std::vector<std::uint32_t>& colors, int width) {
+    const int row = decimation_ * t, radius = sampling_.radius();
+    add_rows(std::max(row - radius, 0), std::min(row + radius, color_.height - 1));
+    for (int s = 0; s < width; ++s) {
+      const std::size_t n = colors.size();
+      colors.push_back(sampled.whole[n] ? of_whole_block(decimation_ * s) : of_some(decimation_ * s, row, sampled.pivots[n]));
+    }
   }
-  return color;
+
+ private:
+  void add_rows(int first, int last) {
+    std::fill(of_columns_.begin(), of_columns_.end(), 0);
+    for (int row = first; row <= last; ++row) {
+      const std::uint8_t* bytes = color_.data + row * color_.step;
+      for (std::size_t n = 0; n < of_columns_.size(); ++n) of_columns_[n] = static_cast<std::uint16_t>(of_columns_[n] + bytes[n]);
+    }
+  }
+
+  std::uint32_t of_whole_block(int column) const {
+    const int red = color_.order == ColorImage::Order::kRgb ? 0 : 2, radius = sampling_.radius(), edge = 2 * radius + 1;
+    Sums sum = {0, 0, 0};
+    const std::uint16_t* of_column = &of_columns_[static_cast<std::size_t>(column - radius) * color_.channels];
+    for (int n = 0; n < edge; ++n, of_column += color_.channels) {
+      sum[0] += of_column[red];
+      sum[1] += of_column[1];
+      sum[2] += of_column[2 - red];
+    }
+    return packed_mean(sum, edge * edge);
+  }
+
+  /// The middle pixel's if nothing was measured.
+  std::uint32_t of_some(int column, int row, float pivot) const {
+    if (pivot == 0) return packed(read_color(color_, column, row));
+    const float lowest = sampling_.lowest(pivot), highest = sampling_.highest(pivot);
+    const int radius = sampling_.radius();
+    Sums sum = {0, 0, 0};
+    std::uint32_t count = 0;
+    for (int y = row - radius; y <= row + radius; ++y)
+      for (int x = column - radius; x <= column + radius; ++x) {
+        const float depth = planes_.at(x, y);
+        if (depth < lowest || depth > highest) continue;
+        const std::array<std::uint32_t, 3> rgb = read_color(color_, x, y);
+        for (int channel = 0; channel < 3; ++channel) sum[channel] += rgb[channel];
+        ++count;
+      }
+    return packed_mean(sum, count);
+  }
+
+  const ColorImage& color_;
+  const DepthPlanes& planes_;
+  const Sampling& sampling_;
+  int decimation_;
+  std::vector<std::uint16_t> of_columns_;  ///< sums of the bytes of a block's rows, at most 65 of them
+};
+
+/// The paper's: one pixel of each block.
+void sample_nearest(const DepthFrame& frame, const Config& config, WorkingImage& image) {
+  image.depth = read_depth(frame.depth, config);
+  if (!frame.color) return;
+  image.color.reserve(image.depth.size());
+  for (int t = 0; t < image.intrinsics.height; ++t)
+    for (int s = 0; s < image.intrinsics.width; ++s)
+      image.color.push_back(packed(read_color(*frame.color, config.decimation * s, config.decimation * t)));
+}
+
+void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& image) {
+  const Sampling sampling(config);
+  const DepthPlanes planes = sampling.planes(frame.depth);
+  SampledDepth sampled = sampling.sample(planes, image.intrinsics.width, image.intrinsics.height);
+  image.depth = std::move(sampled.depth);
+  if (!frame.color) return;
+  image.color.reserve(image.depth.size());
+  MeanColors colors(*frame.color, planes, sampling, config);
+  for (int t = 0; t < image.intrinsics.height; ++t) colors.append_row(t, sampled, image.color, image.intrinsics.width);
 }
 
 }  // namespace
@@ -99,10 +185,10 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config, d
 
   WorkingImage image;
   image.intrinsics = decimated(frame.intrinsics, config.decimation);
-  const int width = image.intrinsics.width, height = image.intrinsics.height;
-  image.depth = frame.depth.encoding == DepthImage::Encoding::kStepsU16 ? read_depth<std::uint16_t>(frame.depth, width, height, config)
-                                                                        : read_depth<std::uint32_t>(frame.depth, width, height, config);
-  if (frame.color) image.color = read_color(*frame.color, width, height, config.decimation);
+  if (config.sampling == "mean" && config.decimation > 1)
+    sample_means(frame, config, image);
+  else
+    sample_nearest(frame, config, image);
   return image;
 }
 

@@ -18,7 +18,8 @@ struct WorkingImage {
 /// Are these the intrinsics of the same camera?
 bool same_camera(const Intrinsics& a, const Intrinsics& b);
 
-/// Takes every decimation-th pixel in both directions, without averaging, and divides the intrinsics by the decimation.
+/// Takes every decimation-th pixel in both directions, or the mean of the pixels around it (sampling.hpp), and divides the intrinsics by
+/// the decimation.
 /// @param max_voxels  see check_grid_size()
 /// @throws BadFrame  a sentence that names what is wrong with the frame
 WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels);

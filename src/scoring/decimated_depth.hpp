@@ -2,15 +2,14 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstring>
-#include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "config/config_text.hpp"
-#include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
+#include "scoring/depth_reading.hpp"
+#include "scoring/mean_depths.hpp"
 
 namespace frontier_surfels::scoring {
 
@@ -18,40 +17,6 @@ namespace frontier_surfels::scoring {
 struct DecimatedDepth {
   Intrinsics intrinsics;
   std::vector<float> depth;  ///< depth[height][width] [m]: > 0 a surface, < 0 free space up to -depth, 0 no measurement
-};
-
-/// The parameters that say how depth images are read.
-struct DepthReading {
-  double z_min = 0;           ///< [m]
-  double z_max = 0;           ///< [m]
-  int decimation = 1;         ///< [pixel]
-  double depth_unit = 0.001;  ///< [m]
-  bool carve_no_return = false;
-  bool carve_beyond_range = false;
-
-  /// @throws Error if the numbers make no sense
-  explicit DepthReading(const Config& config)
-      : z_min(config.z_min),
-        z_max(config.z_max),
-        decimation(config.decimation),
-        depth_unit(config.depth_unit),
-        carve_no_return(config.carve_no_return),
-        carve_beyond_range(config.carve_beyond_range) {
-    if (!(z_min > 0 && z_max > z_min && std::isfinite(z_max))) {
-      throw Error("The depth range must be 0 < z_min < z_max, but is " + to_text(z_min) + " to " + to_text(z_max) + " m.");
-    }
-    if (!(depth_unit > 0 && std::isfinite(depth_unit))) {
-      throw Error("The depth unit must be above 0, but is " + to_text(depth_unit) + " m.");
-    }
-    if (decimation < 1) throw Error("The decimation must be 1 or more, but is " + std::to_string(decimation) + ".");
-  }
-
-  bool operator==(const DepthReading& other) const {
-    const auto all = [](const DepthReading& r) {
-      return std::tuple(r.z_min, r.z_max, r.decimation, r.depth_unit, r.carve_no_return, r.carve_beyond_range);
-    };
-    return all(*this) == all(other);
-  }
 };
 
 /// @throws BadFrame unless the frame has pixels, a camera and a rigid, finite pose
@@ -96,25 +61,24 @@ inline float read_depth(const DepthImage& image, int column, int row, double dep
   return read_pixel<float>(line + column * sizeof(float), image.swap_bytes);
 }
 
-/// What a raw depth [m] says; see DecimatedDepth::depth. The limits are compared as floats, like the depths.
-inline float meaning(float d, const DepthReading& reading) {
-  const float z_min = static_cast<float>(reading.z_min), z_max = static_cast<float>(reading.z_max);
-  if (d >= z_min && d <= z_max) return d;
-  if (!(d > z_max)) return 0;
-  return (std::isinf(d) ? reading.carve_no_return : reading.carve_beyond_range) ? -z_max : 0;
-}
-
-/// Nearest neighbour: pixel (s, t) is (decimation s, decimation t) of the image.
+/// Pixel (s, t) is (decimation s, decimation t) of the image, or the mean of those around it.
 inline DecimatedDepth decimate(const DepthFrame& frame, const DepthReading& reading) {
   check_frame(frame);
   const int n = reading.decimation;
   const Intrinsics& full = frame.intrinsics;
   DecimatedDepth result{{full.fx / n, full.fy / n, full.cx / n, full.cy / n, full.width / n, full.height / n}, {}};
+  if (reading.means && n > 1) {
+    std::vector<float> full_depth;
+    full_depth.reserve(static_cast<std::size_t>(full.width) * full.height);
+    for (int row = 0; row < full.height; ++row)
+      for (int column = 0; column < full.width; ++column) full_depth.push_back(read_depth(frame.depth, column, row, reading.depth_unit));
+    result.depth = mean_depths({full.width, full.height, std::move(full_depth)}, reading);
+    return result;
+  }
   result.depth.reserve(static_cast<std::size_t>(result.intrinsics.width) * result.intrinsics.height);
-  for (int t = 0; t < result.intrinsics.height; ++t) {
+  for (int t = 0; t < result.intrinsics.height; ++t)
     for (int s = 0; s < result.intrinsics.width; ++s)
       result.depth.push_back(meaning(read_depth(frame.depth, n * s, n * t, reading.depth_unit), reading));
-  }
   return result;
 }
 

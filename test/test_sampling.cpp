@@ -1,0 +1,171 @@
+/// The working image with `sampling: mean`: the mapper's against the yardsticks', which is written down anew, and what it does at edges.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "frame/working_image.hpp"
+#include "scoring/decimated_depth.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr double kVoxels = 1e9;
+
+Config config_for(int decimation) {
+  Config config;
+  config.decimation = decimation;
+  return config;
+}
+
+/// A frame of float depths, and its pixels.
+struct Image {
+  int width, height;
+  std::vector<float> depth;
+  std::vector<std::uint8_t> color;
+
+  Image(int columns, int rows, float value) : width(columns), height(rows), depth(static_cast<std::size_t>(columns) * rows, value) {}
+
+  float& at(int column, int row) { return depth[static_cast<std::size_t>(row) * width + column]; }
+
+  DepthFrame frame() const {
+    DepthFrame frame;
+    frame.depth = {width, height, width * sizeof(float), DepthImage::Encoding::kMetresF32, depth.data()};
+    frame.intrinsics = {500, 510, width / 2.0, height / 2.0, width, height};
+    frame.T_world_camera = Eigen::Isometry3d::Identity();
+    if (!color.empty()) frame.color = ColorImage{width, height, width * 3UL, ColorImage::Order::kRgb, 3, color.data()};
+    return frame;
+  }
+  WorkingImage working(const Config& config) const { return make_working_image(frame(), config, kVoxels); }
+};
+
+/// Surfaces with noise, gaps, outliers, and everything else that images have in them.
+Image random_image(int width, int height, std::mt19937& rng) {
+  std::uniform_real_distribution<float> share(0, 1);
+  Image image(width, height, 0);
+  const float gaps = share(rng) < 0.5F ? 0 : share(rng), spread = share(rng) < 0.3F ? 0.5F : 0.03F;
+  const float odd[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1, 0, 0.1F, 9, 1e30F};
+  const float edge = share(rng) * static_cast<float>(width);
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      const float surface = static_cast<float>(column) < edge ? 1.2F : 2.4F;
+      image.at(column, row) = share(rng) < gaps ? odd[rng() % 7] : surface * (1 + spread * (share(rng) - 0.5F));
+    }
+  return image;
+}
+
+TEST(Sampling, IsThatOfTheYardsticks) {
+  std::mt19937 rng(5);
+  for (int n = 0; n < 200; ++n) {
+    Config config = config_for(1 + n % 7);
+    config.carve_beyond_range = n % 3 == 0;
+    config.carve_no_return = n % 2 == 0;
+    config.sampling = n % 10 == 0 ? "nearest" : "mean";
+    const Image image =
+        random_image(config.decimation + static_cast<int>(rng() % 40), config.decimation + static_cast<int>(rng() % 30), rng);
+    const WorkingImage working = image.working(config);
+    const scoring::DecimatedDepth expected = scoring::decimate(image.frame(), scoring::DepthReading(config));
+    ASSERT_EQ(working.depth.size(), expected.depth.size());
+    for (std::size_t pixel = 0; pixel < working.depth.size(); ++pixel)
+      ASSERT_EQ(working.depth[pixel], expected.depth[pixel]) << "image " << n << ", pixel " << pixel;
+  }
+}
+
+TEST(Sampling, ThePapersTakesTheNearestPixel) {
+  Config config = config_for(4);
+  config.sampling = "nearest";
+  Image image(40, 40, 1);
+  image.at(4, 8) = 2;
+  EXPECT_EQ(image.working(config).depth[2 * 10 + 1], 2);
+}
+
+TEST(Sampling, NoiseBecomesLess) {
+  std::mt19937 rng(1);
+  std::normal_distribution<float> noise(2, 0.006F);
+  Image image(400, 400, 0);
+  for (float& depth : image.depth) depth = noise(rng);
+  double squares = 0;
+  const WorkingImage working = image.working(config_for(4));
+  for (const float depth : working.depth) squares += (depth - 2) * (depth - 2);
+  const double deviation = std::sqrt(squares / static_cast<double>(working.depth.size()));
+  EXPECT_LT(deviation, 0.006 / 4);  // 25 pixels: a fifth
+  EXPECT_GT(deviation, 0.006 / 6);
+}
+
+TEST(Sampling, ASinglePixelIsNoMeasurement) {
+  Image image(40, 40, 1);
+  image.at(20, 20) = 2.5F;
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 1);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 21; column < 40; ++column) image.at(column, row) = 2;  // at an edge, nothing says which surface it is on
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 0);
+  image = Image(40, 40, 1);
+  image.at(20, 20) = 1;
+  image.at(21, 20) = 2.5F;  // another one beside it does no harm
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 1);
+}
+
+TEST(Sampling, PixelsBetweenForegroundAndBackgroundAreNoMeasurement) {
+  Image image(40, 40, 1);
+  for (int row = 0; row < 40; ++row) {
+    for (int column = 21; column < 40; ++column) image.at(column, row) = 2;
+    image.at(20, row) = 1.5F;  // the whole column: five pixels of a block agree
+  }
+  const WorkingImage working = image.working(config_for(4));
+  EXPECT_EQ(working.depth[5 * 10 + 4], 1);
+  EXPECT_EQ(working.depth[5 * 10 + 5], 0);
+  EXPECT_EQ(working.depth[5 * 10 + 6], 2);
+}
+
+TEST(Sampling, AThinPoleStays) {
+  Image image(40, 40, 2);
+  for (int row = 0; row < 40; ++row) image.at(20, row) = 1;
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 1);
+}
+
+TEST(Sampling, LostPixelsOfOneSurfaceAreFilled) {
+  Image image(40, 40, 1);
+  for (int row = 19; row <= 21; ++row)
+    for (int column = 19; column <= 21; ++column) image.at(column, row) = 0;
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 1);
+}
+
+TEST(Sampling, LostPixelsBesideASurfaceAreNot) {
+  Image image(40, 40, 1);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 20; column < 40; ++column) image.at(column, row) = 0;  // a shadow: pixels on one side alone
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 0);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 22; column < 40; ++column) image.at(column, row) = 2;  // behind it another surface
+  EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 0);
+}
+
+TEST(Sampling, FreeSpaceNeedsMoreThanOnePixel) {
+  Config config = config_for(4);
+  config.carve_beyond_range = true;
+  Image image(40, 40, 1);
+  image.at(20, 20) = 8;
+  EXPECT_EQ(image.working(config).depth[5 * 10 + 5], 1);
+  for (int column = 18; column <= 22; ++column) image.at(column, 20) = 8;
+  EXPECT_EQ(image.working(config).depth[5 * 10 + 5], -3);
+}
+
+TEST(Sampling, ColoursAreThoseOfTheSameSurface) {
+  Image image(40, 40, 1);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 0; column < 40; ++column) {
+      const bool far = column > 20;
+      if (far) image.at(column, row) = 2;
+      for (const int value : {far ? 0 : 100 + 2 * (row % 2), far ? 255 : 7, 9}) image.color.push_back(static_cast<std::uint8_t>(value));
+    }
+  const WorkingImage working = image.working(config_for(4));
+  EXPECT_EQ(working.color[5 * 10 + 5], 101U | 7U << 8 | 9U << 16);  // rows 18 to 22: 100, 102, 100, 102, 100
+  EXPECT_EQ(working.color[5 * 10 + 6], 0U | 255U << 8 | 9U << 16);
+}
+
+}  // namespace
+}  // namespace frontier_surfels
