@@ -23,6 +23,13 @@ inline Config reading(double z_min, double z_max, int decimation) {
   return config;
 }
 
+/// The same with the nearest pixels, not the means of those around them.
+inline Config nearest_reading(double z_min, double z_max, int decimation) {
+  Config config = reading(z_min, z_max, decimation);
+  config.sampling = "nearest";
+  return config;
+}
+
 /// A depth frame that owns its image's bytes, laid out as a driver would deliver them.
 struct OwnedFrame {
   std::vector<unsigned char> bytes;

@@ -132,7 +132,7 @@ TEST(ExactTest, DecimatesLikeTheMapper) {
   for (int t = 0; t < 14; t += 4) {
     for (int s = 0; s < 11; s += 4) frame.set(s, t, 1 + 0.1 * (s / 4) + 0.01 * (t / 4));
   }
-  ExactTest test(reading(0.5, 3, 4));  // 2 x 3 pixels: column 8 and row 12 begin no whole block
+  ExactTest test(nearest_reading(0.5, 3, 4));  // 2 x 3 pixels: column 8 and row 12 begin no whole block
   test.add(frame.view());
   for (int t = 0; t < 4; ++t) {
     for (int s = 0; s < 3; ++s) {

@@ -24,7 +24,7 @@ struct SlowView {
 struct RandomScene {
   static constexpr double kZMin = 0.4, kZMax = 2.5;
   static constexpr int kDecimation = 3;
-  ExactTest test{reading(kZMin, kZMax, kDecimation)};
+  ExactTest test{nearest_reading(kZMin, kZMax, kDecimation)};
   std::vector<SlowView> views;
   std::vector<Surfel> surfels;
 };

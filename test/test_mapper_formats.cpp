@@ -179,15 +179,17 @@ TEST(MapperFormats, SurfelsTakeTheirPixelsColourAndColourChangesNothingElse) {
   EXPECT_TRUE(same(plain, colored));
 }
 
-/// Decimation takes every fourth pixel and divides the intrinsics by four.
+/// Decimation takes every fourth pixel, if sampling says so, and divides the intrinsics by four.
 TEST(MapperFormats, ADecimatedImageIsLikeASmallerOne) {
+  Config config;
+  config.sampling = "nearest";
   const replay::Room room;
   Frames full, small;
   for (const int index : {0, 8}) {
     full.push_back(room.render(index, 200, replay::synthetic_camera(640, 480)));
     small.push_back(room.render(index, 200, replay::synthetic_camera(160, 120)));
   }
-  const auto surfels = map_of(full, Config());
+  const auto surfels = map_of(full, config);
   EXPECT_GT(surfels.size(), 50000u);
   EXPECT_TRUE(same(surfels, map_of(small, undecimated())));
 }

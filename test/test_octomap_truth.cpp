@@ -161,7 +161,7 @@ TEST(OctomapTruth, ReadsWhatTheMapperReads) {
   frame.depth = {5, 4, 5 * sizeof(float), DepthImage::Encoding::kMetresF32, depth.data(), false};
   frame.intrinsics = {20, 20, 0, 2, 5, 4};
   frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(centre({0, 0, 0})));
-  OctomapTruth truth(kResolution, reading(0.5, 3, 2));
+  OctomapTruth truth(kResolution, nearest_reading(0.5, 3, 2));
   truth.add(frame);
   // Pixel (0, 1), the principal point: straight ahead, from z = 0.05 m to 0.9 m.
   SlowMap slow;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frame/working_image.hpp"
+#include "frontier_surfels/scoring/exact_test.hpp"
 #include "scoring/decimated_depth.hpp"
 
 namespace frontier_surfels {
@@ -72,6 +73,22 @@ TEST(Sampling, IsThatOfTheYardsticks) {
     ASSERT_EQ(working.depth.size(), expected.depth.size());
     for (std::size_t pixel = 0; pixel < working.depth.size(); ++pixel)
       ASSERT_EQ(working.depth[pixel], expected.depth[pixel]) << "image " << n << ", pixel " << pixel;
+  }
+}
+
+/// The mean of 24 pixels at 1 m and one at 1.02 m is 1.0008 m.
+TEST(Sampling, TheExactTestTakesTheMeans) {
+  Image image(40, 40, 1);
+  for (int row = 0; row < 40; row += 4)
+    for (int column = 0; column < 40; column += 4) image.at(column, row) = 1.02F;
+  for (const char* sampling : {"mean", "nearest"}) {
+    Config config = config_for(4);
+    config.sampling = sampling;
+    scoring::ExactTest test(config);
+    test.add(image.frame());
+    EXPECT_TRUE(test.known({0, 0, 1.0007})) << sampling;
+    EXPECT_EQ(test.known({0, 0, 1.0009}), config.sampling == "nearest");
+    EXPECT_EQ(test.known({0, 0, 1.0199}), config.sampling == "nearest");
   }
 }
 
