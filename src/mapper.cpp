@@ -161,6 +161,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
   const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
+  report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
   const Frame frame = begin_frame(image, input.T_world_camera, camera, number);
 

@@ -121,6 +121,16 @@ TEST(Config, LanesAreOneOrSixteen) {
   }
 }
 
+TEST(Config, SamplingIsOneOfTwo) {
+  Config config;
+  config.sampling = "median";
+  EXPECT_EQ(all_problems(config), "sampling is 'median': it must be mean or nearest.\n");
+  for (const char* sampling : {"mean", "nearest"}) {
+    config.sampling = sampling;
+    EXPECT_EQ(all_problems(config), "");
+  }
+}
+
 TEST(Config, EqualDepthsAreAProblem) {
   Config config;
   config.z_max = config.z_min;

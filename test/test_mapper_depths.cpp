@@ -41,9 +41,20 @@ TEST(MapperDepths, NothingMeasuredMakesNoSurfel) {
     const Report report = mapper.integrate(plane_frame(coarse_camera(), depth).view());
     EXPECT_EQ(report.surfels, 0u) << depth;
     EXPECT_EQ(report.created, 0u) << depth;
+    EXPECT_EQ(report.measured_pixels, 0u) << depth;
     EXPECT_TRUE(mapper.surfels().empty()) << depth;
     EXPECT_EQ(mapper.sequence(), 1u) << "the frame counts";
   }
+}
+
+TEST(MapperDepths, ReportsHowManyPixelsHaveMeasuredSomething) {
+  Config config = undecimated();
+  config.carve_no_return = true;
+  replay::RecordedFrame frame = plane_frame(coarse_camera(), 1);
+  frame.depth.colRange(0, 10).setTo(0);
+  frame.depth.colRange(10, 30).setTo(kInfinity);
+  Mapper mapper(config);
+  EXPECT_EQ(mapper.integrate(frame.view()).measured_pixels, 60u * 70u);
 }
 
 TEST(MapperDepths, NothingMeasuredChangesNothing) {

@@ -88,6 +88,9 @@ class CommandLine(unittest.TestCase):
                 ('replay_score', [*there, '--first'], '--first needs a value.'),
                 ('replay_score', [*there, '--report', 'y'], '--report can be given only once.'),
                 ('replay_score', [*there, '--set', 'decimation=0'], 'decimation is 0 pixel: it must be from 1 to 64 pixel.'),
+                ('replay_score', [*there, '--set', 'sampling=median'], "sampling is 'median': it must be mean or nearest."),
+                ('replay_score', [*there, '--set', 'noise=-0.001'], 'noise is -0.001 m: it must be from 0 to 1 m.'),
+                ('replay_score', [*there, '--set', 'agreement=0'], 'agreement is 0: it must be from 0.001 to 0.5.'),
                 ('replay_score', [*there, '--sweep', 'th_d'], "--sweep 'th_d' is not of the form PARAM=LO:HI:N, as in th_d=0.01:0.42:9."),
                 ('make_synthetic', ['x', '--frames', 'many'], "--frames: must be a whole number from 1 to 999999, not 'many'."),
                 ('make_synthetic', ['x', '--path', 'up'], "--path: must be orbit, explore, turn, walk, close, arc or watch, not 'up'."),
@@ -255,8 +258,20 @@ class NothingUsable(unittest.TestCase):
             depth = numpy.array(PIL.Image.open(path)).astype(int)
             PIL.Image.fromarray(change(depth).astype(numpy.uint16)).save(path)
 
-    def run_room(self):
-        return run(self.room, '--report', self.report, '--set', 'decimation=1', '--octomap-resolution', 0.05)
+    def run_room(self, *settings):
+        return run(self.room, '--report', self.report, '--octomap-resolution', 0.05, '--set', *(settings or ['decimation=1']))
+
+    def check_empty(self, result, reason, remedy):
+        self.assertEqual(result.returncode, FAILED, result.stderr)
+        self.assertRegex(result.stderr, r'^replay_score: The map of [^\n]* is empty. 3 of 3 depth images [^\n]*' + remedy + r'[^\n]*\n$')
+        self.assertRegex(result.stdout, r'WARNING +3 of 3 depth images [^\n]*' + remedy)
+        self.assertNotRegex(result.stdout, 'exact test|OctoMap')
+        self.assertEqual([row['reason'] for row in read_rows(self.report)], 3 * [reason])
+        summary = read_json(self.report)
+        self.assertEqual(summary['reasons'], {reason: 3})
+        self.assertNotIn('exact', summary)
+        with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
+            self.assertIn(remedy, file.read())
 
     def test_depths(self):
         for reason, remedy, change in [('no_measurement', 'camera delivers depth', lambda depth: 0 * depth),
@@ -265,17 +280,16 @@ class NothingUsable(unittest.TestCase):
                                        ('too_far', 'correct depth_unit', lambda depth: depth * 0 + 60000)]:
             with self.subTest(reason=reason):
                 self.change_depth(change)
-                result = self.run_room()
-                self.assertEqual(result.returncode, FAILED, result.stderr)
-                self.assertRegex(result.stderr, r'^replay_score: The map of [^\n]* is empty. 3 of 3 depth images [^\n]*' + remedy + r'[^\n]*\n$')
-                self.assertRegex(result.stdout, r'WARNING +3 of 3 depth images [^\n]*' + remedy)
-                self.assertNotRegex(result.stdout, 'exact test|OctoMap')
-                self.assertEqual([row['reason'] for row in read_rows(self.report)], 3 * [reason])
-                summary = read_json(self.report)
-                self.assertEqual(summary['reasons'], {reason: 3})
-                self.assertNotIn('exact', summary)
-                with open(os.path.join(self.report, 'report.html'), encoding='utf-8') as file:
-                    self.assertIn(remedy, file.read())
+                self.check_empty(self.run_room(), reason, remedy)
+
+    def test_depths_that_jump_from_pixel_to_pixel(self):
+        def change(depth):
+            rows, columns = numpy.indices(depth.shape)
+            return 600 * 1.06 ** (5 * (columns % 5) + rows % 5)
+
+        self.change_depth(change)
+        self.check_empty(self.run_room('decimation=4'), 'no_agreement', 'set sampling: nearest')
+        self.assertEqual(self.run_room('decimation=4', '--set', 'sampling=nearest').returncode, DONE)
 
     def test_still_camera(self):
         path = os.path.join(self.room, 'poses.txt')

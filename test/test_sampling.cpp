@@ -92,6 +92,14 @@ TEST(Sampling, TheExactTestTakesTheMeans) {
   }
 }
 
+TEST(Sampling, TheExactTestRefusesWhatMakesNoSense) {
+  Config median, negative;
+  median.sampling = "median";
+  negative.noise_growth = -1;
+  EXPECT_THROW(scoring::ExactTest{median}, Error);
+  EXPECT_THROW(scoring::ExactTest{negative}, Error);
+}
+
 TEST(Sampling, ThePapersTakesTheNearestPixel) {
   Config config = config_for(4);
   config.sampling = "nearest";
@@ -136,6 +144,17 @@ TEST(Sampling, PixelsBetweenForegroundAndBackgroundAreNoMeasurement) {
   EXPECT_EQ(working.depth[5 * 10 + 4], 1);
   EXPECT_EQ(working.depth[5 * 10 + 5], 0);
   EXPECT_EQ(working.depth[5 * 10 + 6], 2);
+}
+
+TEST(Sampling, PixelsThatDisagreeMeasureNothing) {
+  Image image(80, 60, 0);
+  for (int row = 0; row < 60; ++row)
+    for (int column = 0; column < 80; ++column)  // 25 depths from 0.6 to 2.4 m, each 6 % from the next one
+      image.at(column, row) = 0.6F * std::pow(1.06F, static_cast<float>(5 * (column % 5) + row % 5));
+  Config config = config_for(4);
+  EXPECT_EQ(image.working(config).measured_pixels(), 0U);
+  config.sampling = "nearest";
+  EXPECT_EQ(image.working(config).measured_pixels(), 20U * 15);
 }
 
 TEST(Sampling, AThinPoleStays) {

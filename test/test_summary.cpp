@@ -38,7 +38,7 @@ FrameRecord frame(int i) {
   if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
   record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
   record.cpu_ms = 2 * (i + 1);
-  record.depths.usable = 1;
+  record.depths.usable = record.depths.in_working_image = 1;
   record.octomap = scoring::InsertionTime{100.0 * (i + 1), 90.0 * (i + 1)};
   return record;
 }

@@ -11,15 +11,16 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
 
+/// @param in_working_image  pixels of the working image that have measured something
 template <typename Pixel>
-DepthCensus census(const std::vector<Pixel>& pixels, const Config& config) {
+DepthCensus census(const std::vector<Pixel>& pixels, const Config& config, std::size_t in_working_image = 1) {
   DepthImage image;
   image.width = static_cast<int>(pixels.size());
   image.height = 1;
   image.step = sizeof(Pixel) * pixels.size();
   image.encoding = sizeof(Pixel) == 2 ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
   image.data = pixels.data();
-  return count_depths(image, config);
+  return count_depths(image, config, in_working_image);
 }
 
 Config every_pixel() {
@@ -62,10 +63,10 @@ TEST(DepthCensus, LooksAtThePixelsOfTheMapperInEitherByteOrder) {
   const std::vector<std::uint16_t> pixels = {0x0100, 7, 0x0200, 7, 7, 7, 7, 7};
   config.decimation = 2;
   DepthImage image = {4, 1, 8, DepthImage::Encoding::kStepsU16, pixels.data(), false};
-  EXPECT_EQ(count_depths(image, config).missing, 0u) << "the image has no whole block of 2 x 2 pixels";
+  EXPECT_EQ(count_depths(image, config, 0).missing, 0u) << "the image has no whole block of 2 x 2 pixels";
   image.height = 2;
   image.swap_bytes = true;
-  const DepthCensus swapped = count_depths(image, config);
+  const DepthCensus swapped = count_depths(image, config, 0);
   EXPECT_EQ(swapped.too_near, 2u);
   EXPECT_FLOAT_EQ(swapped.farthest, 0.002F);
 }
@@ -81,16 +82,35 @@ TEST(DepthCensus, ReadsStepsOfTheConfiguredUnit) {
             std::string::npos);
 }
 
+TEST(DepthCensus, UsablePixelsThatDisagreeAreAReason) {
+  EXPECT_EQ(census<float>({1, 2}, every_pixel(), 0).reason(), "no_agreement");
+  EXPECT_EQ(census<float>({1, 2}, every_pixel(), 1).reason(), "");
+  EXPECT_EQ(census<float>({1500}, every_pixel(), 0).reason(), "too_far") << "what is wrong with the pixels themselves comes first";
+}
+
+/// The mean has all pixels: those between the ones that the paper reads, too.
+TEST(DepthCensus, WithTheMeanAllPixelsCountIfThoseOfThePaperHaveMeasuredNothing) {
+  Config config;
+  config.decimation = 2;
+  const std::vector<float> pixels = {0, 1, kNan, 1, 1, 1, 1, 1};
+  const DepthImage image = {4, 2, 16, DepthImage::Encoding::kMetresF32, pixels.data(), false};
+  EXPECT_EQ(count_depths(image, config, 0).usable, 6u);
+  EXPECT_EQ(count_depths(image, config, 0).reason(), "no_agreement");
+  EXPECT_EQ(count_depths(image, config, 1).reason(), "");
+  config.sampling = "nearest";
+  EXPECT_EQ(count_depths(image, config, 0).reason(), "no_measurement");
+}
+
 /// A run of frames with these pixels, whose camera moves.
 template <typename Pixel>
-Run run_of(const std::vector<std::vector<Pixel>>& images, const Config& config = every_pixel()) {
+Run run_of(const std::vector<std::vector<Pixel>>& images, const Config& config = every_pixel(), std::size_t in_working_image = 1) {
   Run run;
   run.config = config;
   run.world_frame = "map";
   for (const auto& pixels : images) {
     FrameRecord frame;
     frame.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(0.1 * static_cast<double>(run.frames.size()), 0, 0));
-    frame.depths = census(pixels, run.config);
+    frame.depths = census(pixels, run.config, in_working_image);
     run.frames.push_back(frame);
   }
   return run;
@@ -110,6 +130,7 @@ TEST(Warnings, NameTheCauseAndTheRemedy) {
   expect_warning(run_of<float>({{1500, 900}, {2500}}), {"2 of 2", "900 to 2.5e+03 m", "look like millimetres", "divide them by 1000"});
   expect_warning(run_of<float>({{kInfinity, kNan}}), {"only depths of +Inf", "carve_no_return"});
   expect_warning(run_of<float>({{0.001F}}), {"0.001 m", "must be in metres"});
+  expect_warning(run_of<float>({{1, 2}}, every_pixel(), 0), {"1 of 1", "differ by more than agreement = 0.03", "or set sampling: nearest"});
 }
 
 TEST(Warnings, AWrongUnitIsFoundIfFewDepthsAreInRange) {

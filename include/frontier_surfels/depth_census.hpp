@@ -10,7 +10,8 @@
 
 namespace frontier_surfels {
 
-/// Number of the pixels that the mapper reads, by what they are. Depths that only carve free space are usable.
+/// Number of the pixels of a depth image, by what they are: of every decimation-th column and row, or of all pixels if none of these has
+/// measured anything, because `sampling: mean` uses the others as well. Depths that only carve free space are usable.
 struct DepthCensus {
   std::size_t usable = 0;
   std::size_t carved = 0;                                  ///< of the usable ones: beyond z_max, they carve free space
@@ -22,18 +23,21 @@ struct DepthCensus {
   bool in_metres = false;                                  ///< 32-bit image
   float nearest = std::numeric_limits<float>::infinity();  ///< smallest depth, usable or not [m]
   float farthest = 0;                                      ///< largest finite depth, usable or not [m]
+  std::size_t in_working_image = 0;                        ///< pixels of the working image that have measured something
 
   std::size_t measured() const { return usable + saturated + too_near + too_far; }
 
-  /// Why no pixel is usable: no_measurement, saturated, too_near, too_far or out_of_range; empty if some pixel is usable.
+  /// Why nothing is in the working image: no_measurement, saturated, too_near, too_far or out_of_range if no pixel is usable, no_agreement
+  /// if some are, but no pixels around one measure the same surface; empty if something is.
   std::string reason() const;
 
   /// Adds the counts of another image.
   DepthCensus& operator+=(const DepthCensus& other);
 };
 
-/// @param image  with data and a valid size
-DepthCensus count_depths(const DepthImage& image, const Config& config);
+/// @param image             with data and a valid size
+/// @param in_working_image  Report::measured_pixels of the image
+DepthCensus count_depths(const DepthImage& image, const Config& config, std::size_t in_working_image);
 
 /// A sentence about images of which nearly no measured depth is a surface from z_min to z_max, as with a wrong unit; empty if enough are,
 /// or if no depth is usable. Depths that only carve free space are none, and those of +Inf do not count. @param depths  of several images
@@ -41,6 +45,9 @@ std::string few_in_range(const DepthCensus& depths, const Config& config);
 
 /// "z_min = 0.4 m to z_max = 3 m", for messages.
 std::string depth_range(const Config& config);
+
+/// End of a sentence about images whose reason is no_agreement: "depths from z_min = 0.5 m to z_max = 3 m, but around no pixel ...".
+std::string no_agreement(const Config& config);
 
 /// End of a sentence about depths out of range, whose unit may be wrong: "from 20 to 60 m: 16-bit images are read in steps of ...".
 std::string range_and_remedy(const DepthCensus& depths, const Config& config);

@@ -38,8 +38,8 @@ void count_depth(float depth, const Config& config, DepthCensus& census) {
 }
 
 template <typename Pixel>
-void count_pixels(const DepthImage& image, const Config& config, DepthCensus& census) {
-  for_each_pixel<Pixel>(image, config.decimation, [&](Pixel pixel) {
+void count_pixels(const DepthImage& image, int decimation, const Config& config, DepthCensus& census) {
+  for_each_pixel<Pixel>(image, decimation, [&](Pixel pixel) {
     if (sizeof(Pixel) == 2 && pixel == kSaturated) {
       ++census.saturated;
     } else {
@@ -48,10 +48,21 @@ void count_pixels(const DepthImage& image, const Config& config, DepthCensus& ce
   });
 }
 
+DepthCensus count_every(int decimation, const DepthImage& image, const Config& config) {
+  DepthCensus census;
+  census.in_metres = image.encoding == DepthImage::Encoding::kMetresF32;
+  if (census.in_metres) {
+    count_pixels<std::uint32_t>(image, decimation, config, census);
+  } else {
+    count_pixels<std::uint16_t>(image, decimation, config, census);
+  }
+  return census;
+}
+
 }  // namespace
 
 std::string DepthCensus::reason() const {
-  if (usable > 0) return {};
+  if (usable > 0) return in_working_image > 0 ? "" : "no_agreement";
   if (measured() == 0) return "no_measurement";
   if (saturated == measured()) return "saturated";
   if (too_near > 0 && too_far == 0) return "too_near";
@@ -70,10 +81,18 @@ DepthCensus& DepthCensus::operator+=(const DepthCensus& other) {
   in_metres = other.in_metres;
   nearest = std::min(nearest, other.nearest);
   farthest = std::max(farthest, other.farthest);
+  in_working_image += other.in_working_image;
   return *this;
 }
 
 std::string depth_range(const Config& config) { return "z_min = " + number(config.z_min) + " m to z_max = " + number(config.z_max) + " m"; }
+
+std::string no_agreement(const Config& config) {
+  return "depths from " + depth_range(config) + ", but around no pixel do enough pixels measure the same surface, because their depths " +
+         "differ by more than agreement = " + number(config.agreement) +
+         ", noise, noise_growth and quantisation allow, or most have none: " +
+         "check the camera, set its sensor model (the folder config has some), or set sampling: nearest.";
+}
 
 std::string range_and_remedy(const DepthCensus& depths, const Config& config) {
   if (depths.farthest == 0)  // none is finite
@@ -99,14 +118,10 @@ std::string few_in_range(const DepthCensus& depths, const Config& config) {
          carves + (in_range == 0 ? ". All are " : ". All others are ") + range_and_remedy(depths, config);
 }
 
-DepthCensus count_depths(const DepthImage& image, const Config& config) {
-  DepthCensus census;
-  census.in_metres = image.encoding == DepthImage::Encoding::kMetresF32;
-  if (census.in_metres) {
-    count_pixels<std::uint32_t>(image, config, census);
-  } else {
-    count_pixels<std::uint16_t>(image, config, census);
-  }
+DepthCensus count_depths(const DepthImage& image, const Config& config, std::size_t in_working_image) {
+  DepthCensus census = count_every(config.decimation, image, config);
+  if (census.measured() == 0 && config.sampling == "mean") census = count_every(1, image, config);
+  census.in_working_image = in_working_image;
   return census;
 }
 

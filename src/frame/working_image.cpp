@@ -172,6 +172,8 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
 
 }  // namespace
 
+std::size_t WorkingImage::measured_pixels() const { return depth.size() - std::count(depth.begin(), depth.end(), 0.0F); }
+
 bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }

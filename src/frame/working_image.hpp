@@ -1,6 +1,7 @@
 /// The working image: a frame's depths and colours after checking and decimation.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -13,6 +14,8 @@ struct WorkingImage {
   Intrinsics intrinsics;             ///< of the decimated image
   std::vector<float> depth;          ///< depth[height][width] [m]: > 0 surface, < 0 free space up to -depth, 0 no measurement
   std::vector<std::uint32_t> color;  ///< [height][width]: red | green << 8 | blue << 16; empty if the frame has none
+
+  std::size_t measured_pixels() const;  ///< see Report
 };
 
 /// Are these the intrinsics of the same camera?

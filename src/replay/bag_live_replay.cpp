@@ -44,6 +44,7 @@ Report to_report(const FrameReport& message) {
   report.sequence = message.sequence;
   report.surfels = message.surfels;
   report.in_view = message.in_view;
+  report.measured_pixels = message.measured_pixels;
   report.created = message.created;
   report.removed = message.removed;
   report.split = message.split;
@@ -75,7 +76,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
     return;
   }
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
-  record.depths = count_depths(frame.view().depth, run.config);
+  record.depths = count_depths(frame.view().depth, run.config, record.report.measured_pixels);
   record.index = frame.index;
   if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view(), frame.index);
   run.frames.push_back(std::move(record));

@@ -69,7 +69,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
       const double cpu_before_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID);
       FrameRecord record{mapper.integrate(view), view.T_world_camera, std::nullopt};
       record.cpu_ms = scoring::cpu_ms(CLOCK_PROCESS_CPUTIME_ID) - cpu_before_ms;
-      record.depths = count_depths(view.depth, run.config);
+      record.depths = count_depths(view.depth, run.config, record.report.measured_pixels);
       record.index = frame->index;
       after_frame(view, record);
       run.frames.push_back(std::move(record));

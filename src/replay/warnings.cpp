@@ -18,11 +18,12 @@ std::string sentence(const std::string& reason, const std::string& frames, const
            "or folder is chosen.";
   if (reason == "saturated")
     return frames + " are 65535 in every pixel that is not 0, which means no measurement: check the camera and its driver.";
+  if (reason == "no_agreement") return frames + " have " + no_agreement(config);
   return frames + " have no depth from " + depth_range(config) + ", only depths " + range_and_remedy(depths, config);
 }
 
 void warn_of_depths(const Run& run, std::vector<std::string>& warnings) {
-  for (const char* reason : {"no_measurement", "saturated", "too_near", "too_far", "out_of_range"}) {
+  for (const char* reason : {"no_measurement", "saturated", "too_near", "too_far", "out_of_range", "no_agreement"}) {
     DepthCensus depths;
     std::size_t count = 0;
     for (const FrameRecord& frame : run.frames) {

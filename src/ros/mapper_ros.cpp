@@ -252,7 +252,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   FrameReport message = messages::to_message(report);
   message.header = header;
   message.result = FrameReport::INTEGRATED;
-  message.reason = camera.remarks().on(frame, *image.info, Clock::now());
+  message.reason = camera.remarks().on(frame, report.measured_pixels, *image.info, Clock::now());
   if (!pixels.color_fault().empty()) camera.remarks().warn_of_pixels(pixels.color_fault(), Clock::now());
   message.wait_ms = wait_ms;
   message.latency_ms = ms_since(image.arrival.time);

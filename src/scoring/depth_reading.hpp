@@ -42,6 +42,13 @@ struct DepthReading {
       throw Error("The depth unit must be above 0, but is " + to_text(depth_unit) + " m.");
     }
     if (decimation < 1) throw Error("The decimation must be 1 or more, but is " + std::to_string(decimation) + ".");
+    if (config.sampling != "mean" && config.sampling != "nearest") {
+      throw Error("The sampling must be mean or nearest, but is '" + config.sampling + "'.");
+    }
+    if (!(noise >= 0 && noise_growth >= 0 && quantisation >= 0 && agreement >= 0)) {
+      throw Error("The noise, noise_growth, quantisation and agreement of the sensor must not be negative, but are " + to_text(noise) +
+                  ", " + to_text(noise_growth) + ", " + to_text(quantisation) + " and " + to_text(agreement) + ".");
+    }
   }
 
   bool operator==(const DepthReading& other) const {

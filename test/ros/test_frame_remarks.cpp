@@ -32,13 +32,14 @@ class Remarks : public testing::Test {
     frame.depth.height = 8;
     frame.depth.step = sizeof(Pixel) * static_cast<std::size_t>(width);
     frame.T_world_camera = Eigen::Translation3d(x, 0, 0) * Eigen::Isometry3d::Identity();
-    return remarks.on(frame, info_, now_);
+    return remarks.on(frame, measured_pixels_, info_, now_);
   }
 
   std::string on_millimetres(int value) { return on(static_cast<std::uint16_t>(value)); }
 
   static bool says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
+  std::size_t measured_pixels_ = 1;  ///< of the working image
   std::vector<std::string> warned_;
   Config config_;
   FrameRemarks remarks_{config_, [this](const std::string& remark) { warned_.push_back(remark); }};
@@ -60,6 +61,14 @@ TEST_F(Remarks, ImagesWithoutAUsablePixelHaveTheLikelyCause) {
   EXPECT_TRUE(says(on_millimetres(20000), "20 m: 16-bit images are read in steps of depth_unit = 0.001 m"));
   EXPECT_TRUE(says(on(1500.0F), "look like millimetres"));
   EXPECT_TRUE(says(on(7.0F), "z_max"));
+}
+
+TEST_F(Remarks, PixelsThatDisagreeHaveTheLikelyCause) {
+  measured_pixels_ = 0;
+  EXPECT_TRUE(says(on(1.5F), "differ by more than agreement = 0.03"));
+  EXPECT_TRUE(says(on_millimetres(1500), "or set sampling: nearest"));
+  EXPECT_TRUE(says(on_millimetres(0), "no measurement in any pixel")) << "that is the cause then";
+  EXPECT_EQ(warned_.size(), 2U);
 }
 
 TEST_F(Remarks, MillimetresAreNotTakenForFreeSpace) {

@@ -93,6 +93,11 @@ class Inputs(MapperTest):
             report = self.mapper.report(self.camera.send(2, message=raw_image(numpy.full(shape, value, dtype=numpy.uint16), '16UC1', None)))
             self.assertEqual(report.result, FrameReport.INTEGRATED)
             self.assertRegex(report.reason, reason)
+        rows, columns = numpy.indices(shape)
+        noise = (600 * 1.06 ** (5 * (columns % 5) + rows % 5)).astype(numpy.uint16)  # the pixels of a block differ by 6 % or more
+        report = self.mapper.report(self.camera.send(2, message=raw_image(noise, '16UC1', None)))
+        self.assertEqual((report.result, report.measured_pixels), (FrameReport.INTEGRATED, 0))
+        self.assertRegex(report.reason, r'^The depth image has depths from .* differ by more than agreement.* sampling: nearest\.$')
         report = self.mapper.report(self.camera.send(2, message=raw_image(1000 * metres(self.camera.camera.depth(2)), '32FC1', None)))
         self.assertRegex(report.reason, 'look like millimetres')
         self.assert_same_but_ids(before, self.mapper.surfels())

@@ -121,6 +121,7 @@ class LaunchFiles(unittest.TestCase):
         with open(os.path.join(report, 'summary.json'), encoding='utf-8') as file:
             summary = json.load(file)
         self.assertEqual(summary['input']['frames'], FRAMES)
+        self.assertEqual(summary['reasons'], {})
         self.assertGreater(summary['surfels']['total'], 1000)
         self.assertGreater(summary['truth']['right'], 0.95)
         self.assertTrue(os.path.exists(os.path.join(report, 'report.html')))

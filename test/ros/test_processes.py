@@ -47,7 +47,9 @@ class Processes(unittest.TestCase):
 
     def test_all_wrong_parameters_are_told_at_once(self):
         self.check_refused('z_max.*number', 'decimation', 'on_time_jump.*keep or reset', 'tf_timeout', 'cloud_confidence.*frontier or occupied',
-                           z_max='far', decimation=0, on_time_jump='never', tf_timeout=-1.0, cloud_confidence='high')
+                           'sampling.*mean or nearest', 'noise is -1 m', 'agreement is 0',
+                           z_max='far', decimation=0, on_time_jump='never', tf_timeout=-1.0, cloud_confidence='high',
+                           sampling='median', noise=-1.0, agreement=0.0)
 
     def test_no_such_device(self):
         self.check_refused('no-such-platform', platform='no-such-platform')

@@ -47,7 +47,7 @@ void say_remarks(std::ostream& said) {
   const std::vector<float> pixels(64, 0.125F);
   DepthFrame frame;
   frame.depth = {8, 8, 32, DepthImage::Encoding::kMetresF32, pixels.data(), false};
-  said << remarks.on(frame, replay::info_message(1), {}) << "\n";
+  said << remarks.on(frame, 1, replay::info_message(1), {}) << "\n";
 }
 
 std::string all_texts() {

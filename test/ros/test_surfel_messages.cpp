@@ -310,6 +310,7 @@ TEST(FrameReports, SayWhatTheMapperSays) {
   report.sequence = 1234567890123;
   report.surfels = 1;
   report.in_view = 2;
+  report.measured_pixels = 7;
   report.created = 3;
   report.removed = 4;
   report.split = 5;
@@ -320,6 +321,7 @@ TEST(FrameReports, SayWhatTheMapperSays) {
   EXPECT_EQ(message.sequence, 1234567890123U);
   EXPECT_EQ(message.surfels, 1U);
   EXPECT_EQ(message.in_view, 2U);
+  EXPECT_EQ(message.measured_pixels, 7U);
   EXPECT_EQ(message.created, 3U);
   EXPECT_EQ(message.removed, 4U);
   EXPECT_EQ(message.split, 5U);

@@ -45,8 +45,9 @@ std::string CameraRemarks::about_size(const DepthImage& image) {
          " pixels alternate: do two cameras publish on the topic? " + choose_camera_;
 }
 
-std::string FrameRemarks::on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now) {
-  const DepthCensus depths = count_depths(frame.depth, config_);
+std::string FrameRemarks::on(const DepthFrame& frame, std::size_t measured_pixels, const sensor_msgs::CameraInfo& info,
+                             WarningThrottle::Clock::time_point now) {
+  const DepthCensus depths = count_depths(frame.depth, config_, measured_pixels);
   std::string all = about_pixels(depths);
   if (!all.empty()) warn_of_pixels(all, now);
   std::vector<std::string> remarks = camera_remarks_.on(frame.depth, info);
@@ -66,6 +67,7 @@ void FrameRemarks::warn_of_pixels(const std::string& sentence, WarningThrottle::
 std::string FrameRemarks::about_pixels(const DepthCensus& depths) {
   depths_.push_back(depths);
   if (depths_.size() > kDepthFrames) depths_.pop_front();
+  if (depths.reason() == "no_agreement") return "The depth image has " + no_agreement(config_);
   if (depths.usable > 0)  // about_far() judges far depths that carve
     return depths_.size() < kDepthFrames || config_.carve_beyond_range ? std::string() : few_in_range(sum_of(depths_), config_);
   if (depths.measured() == 0)

@@ -53,8 +53,11 @@ class FrameRemarks {
   /// @param warn  is given each remark as a sentence: the same about pixels every few seconds at most, all others once
   FrameRemarks(const Config& config, Warn warn) : config_(config), warn_(std::move(warn)) {}
 
-  /// @param info  of the frame. @return the remarks about this frame as sentences; empty if there are none
-  std::string on(const DepthFrame& frame, const sensor_msgs::CameraInfo& info, WarningThrottle::Clock::time_point now);
+  /// @param measured_pixels  Report::measured_pixels of the frame
+  /// @param info             of the frame
+  /// @return the remarks about this frame as sentences; empty if there are none
+  std::string on(const DepthFrame& frame, std::size_t measured_pixels, const sensor_msgs::CameraInfo& info,
+                 WarningThrottle::Clock::time_point now);
 
   /// Warns of pixels of which on() does not know, as those of colour images. The same every few seconds at most.
   void warn_of_pixels(const std::string& sentence, WarningThrottle::Clock::time_point now);
