@@ -250,6 +250,26 @@ TEST(ShippedFiles, MapperYamlIsTheDefaults) {
   EXPECT_EQ(to_yaml(load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/mapper.yaml")), to_yaml(Config()));
 }
 
+TEST(ShippedFiles, EveryConfigurationCanBeUsed) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(FRONTIER_SURFELS_SOURCE_DIR "/config")) {
+    names.insert(entry.path().stem().string());
+    EXPECT_EQ(all_problems(load_config(entry.path().string())), "") << entry.path();
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"kinect_v1", "mapper", "paper", "realsense_d400", "time_of_flight"}));
+}
+
+/// Standard deviations at 2 m: of half a step of a Kinect's disparity, of 0.08 pixel of a stereo camera, of time of flight.
+TEST(ShippedFiles, SensorModelsAreThoseOfTheirSources) {
+  const auto deviation = [](const char* name) {
+    const Config config = load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/" + std::string(name) + ".yaml");
+    return config.noise + 4 * config.noise_growth;
+  };
+  EXPECT_NEAR(deviation("kinect_v1"), 0.5 * 4 * 2.85e-3, 1e-9);
+  EXPECT_NEAR(deviation("realsense_d400"), 0.08 * 4 / (424 * 0.05), 2e-4);
+  EXPECT_NEAR(deviation("time_of_flight"), 1e-3 * (1.5 + 0.3 * 4), 1e-9);
+}
+
 TEST(ShippedFiles, PaperYamlIsTable1) {
   const Config paper = load_config(FRONTIER_SURFELS_SOURCE_DIR "/config/paper.yaml");
   EXPECT_EQ(all_problems(paper), "");
@@ -261,6 +281,7 @@ TEST(ShippedFiles, PaperYamlIsTable1) {
   EXPECT_DOUBLE_EQ(paper.th_d, std::cos(80 * std::acos(-1) / 180));
   EXPECT_DOUBLE_EQ(paper.thickness, std::sqrt(3));
   EXPECT_EQ(paper.median_votes, 14);
+  EXPECT_EQ(paper.sampling, "nearest");
 }
 
 TEST(ShippedFiles, ParametersMdHasTheTables) {

@@ -57,9 +57,11 @@ void print_parameters() {
   std::cout
       << "# Parameters\n\n"
          "This file is the output of `replay_score --parameters`: do not edit it. The terms are explained in [method.md](method.md).\n\n"
-         "Parameters are set in a YAML file (`--config FILE.yaml` of the programs, `config:=FILE.yaml` of the launch files; see\n"
-         "[config](../config)), one by one (`--set NAME=VALUE` of replay_score), under `~` of the ROS node, or in C++ as members of\n"
-         "`frontier_surfels::Config`. They are checked together at the start, and cannot be changed later.\n"
+         "Parameters are set in a YAML file (`--config FILE.yaml` of the programs, `config:=FILE.yaml` of the launch files), one by one\n"
+         "(`--set NAME=VALUE` of replay_score), under `~` of the ROS node, or in C++ as members of `frontier_surfels::Config`. They are\n"
+         "checked together at the start, and cannot be changed later. [config](../config) has such files, among them those with the range "
+         "and\n"
+         "the sensor model of the first Kinect, of RealSense D400 and of time-of-flight cameras.\n"
       << parameter_table();
 #ifdef FRONTIER_SURFELS_WITH_ROS
   std::cout << node_parameter_table();

@@ -74,6 +74,8 @@ class LaunchFiles(unittest.TestCase):
             'color_transport', 'image_transport', 'use_color', 'world_frame')])
         paper = self.parameters('mapper.launch', 'config:=' + os.path.join(FOLDER, '..', 'config', 'paper.yaml'), 'world_frame:=odom')
         self.assertEqual((paper['/mapper/recent_views'], paper['/mapper/world_frame']), (0, 'odom'))
+        sensor = self.parameters('realsense.launch', 'config:=' + os.path.join(FOLDER, '..', 'config', 'realsense_d400.yaml'))
+        self.assertEqual((sensor['/mapper/z_min'], sensor['/mapper/noise_growth']), (0.3, 0.0038))
         self.assertTrue(self.parameters('realsense.launch')['/mapper/use_color'])
         self.assertFalse(self.parameters('openni.launch', 'color:=false')['/mapper/use_color'])
 
