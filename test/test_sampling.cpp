@@ -66,8 +66,8 @@ TEST(Sampling, IsThatOfTheYardsticks) {
     config.carve_beyond_range = n % 3 == 0;
     config.carve_no_return = n % 2 == 0;
     config.sampling = n % 10 == 0 ? "nearest" : "mean";
-    const Image image =
-        random_image(config.decimation + static_cast<int>(rng() % 40), config.decimation + static_cast<int>(rng() % 30), rng);
+    const int height = config.decimation + static_cast<int>(rng() % 30), width = config.decimation + static_cast<int>(rng() % 40);
+    const Image image = random_image(width, height, rng);  // the order of a call's arguments would depend on the compiler
     const WorkingImage working = image.working(config);
     const scoring::DecimatedDepth expected = scoring::decimate(image.frame(), scoring::DepthReading(config));
     ASSERT_EQ(working.depth.size(), expected.depth.size());
