@@ -163,6 +163,16 @@ TEST(Sampling, AThinPoleStays) {
   EXPECT_EQ(image.working(config_for(4)).depth[5 * 10 + 5], 1);
 }
 
+/// The middle pixel is too far from the others by its own tolerance, and near enough by theirs, which is larger.
+TEST(Sampling, AMiddlePixelThatAgreesWithTheOthersIsInTheirMean) {
+  Image image(40, 40, 1);
+  image.at(20, 20) = 0.9705F;
+  const Config config = config_for(4);
+  const float depth = image.working(config).depth[5 * 10 + 5];
+  EXPECT_FLOAT_EQ(depth, (24 + 0.9705F) / 25);
+  EXPECT_EQ(depth, scoring::decimate(image.frame(), scoring::DepthReading(config)).depth[5 * 10 + 5]);
+}
+
 TEST(Sampling, LostPixelsOfOneSurfaceAreFilled) {
   Image image(40, 40, 1);
   for (int row = 19; row <= 21; ++row)

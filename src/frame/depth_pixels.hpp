@@ -24,6 +24,14 @@ inline float to_metres(std::uint32_t bits, double /*depth_unit*/) {
   return metres;
 }
 
+/// The pixel whose bytes begin at `bytes`.
+template <typename Pixel>
+Pixel pixel_at(const std::uint8_t* bytes, bool swap_bytes) {
+  Pixel pixel;
+  std::memcpy(&pixel, bytes, sizeof(pixel));
+  return swap_bytes ? swapped(pixel) : pixel;
+}
+
 /// Calls visit(pixel) for the upper left pixel of every whole block of decimation x decimation pixels, row by row.
 /// @tparam Pixel  unsigned integer of the image's pixel size
 template <typename Pixel, typename Visit>
@@ -31,11 +39,7 @@ void for_each_pixel(const DepthImage& image, int decimation, Visit visit) {
   const int width = image.width / decimation, height = image.height / decimation;
   for (int t = 0; t < height; ++t) {
     const auto* row = static_cast<const std::uint8_t*>(image.data) + t * decimation * image.step;
-    for (int s = 0; s < width; ++s, row += decimation * sizeof(Pixel)) {
-      Pixel pixel;
-      std::memcpy(&pixel, row, sizeof(pixel));
-      visit(image.swap_bytes ? swapped(pixel) : pixel);
-    }
+    for (int s = 0; s < width; ++s, row += decimation * sizeof(Pixel)) visit(pixel_at<Pixel>(row, image.swap_bytes));
   }
 }
 

@@ -13,6 +13,15 @@ constexpr double kLeastShare = 0.16;  // of a block's pixels that must agree: 4 
 constexpr int kMostOthers = 8;        // so many pixels that agree for each other one, where a block is filled
 constexpr float kSigmas = 3;          // of noise within which pixels of one surface are
 
+/// The side of a line on which a pixel lies, in the line's own two bits. @param across  distance from the line, with its sign
+unsigned side_of_line(int line, int across) { return (across < 0 ? 1U : across > 0 ? 2U : 0U) << (2 * line); }
+
+/// Sides of the four lines through the middle pixel on which the pixel (dx, dy) from it lies.
+unsigned sides_of(int dx, int dy) {
+  return side_of_line(0, dx) | side_of_line(1, dy) | side_of_line(2, dx + dy) | side_of_line(3, dx - dy);
+}
+constexpr unsigned kAllSides = 0xff;
+
 }  // namespace
 
 float interpret(float d, const Config& config) {
@@ -40,9 +49,8 @@ void DepthPlanes::read(const DepthImage& image, const Config& config) {
   for (int row = 0; row < image.height; ++row) {
     const auto* pixels = static_cast<const std::uint8_t*>(image.data) + row * image.step;
     for (int column = 0; column < image.width; ++column) {
-      Pixel pixel;
-      std::memcpy(&pixel, pixels + column * sizeof(Pixel), sizeof(pixel));
-      const float raw = to_metres(image.swap_bytes ? swapped(pixel) : pixel, config.depth_unit), finite = std::min(raw, far);
+      const float raw = to_metres(pixel_at<Pixel>(pixels + column * sizeof(Pixel), image.swap_bytes), config.depth_unit),
+                  finite = std::min(raw, far);
       of_row[column] = raw > 0 ? (raw == infinity ? no_return : finite) : 0;
     }
     for (int first = 0; first < decimation_; ++first) {
@@ -138,45 +146,35 @@ SampledDepth Sampling::sample(const DepthPlanes& planes, int width, int height) 
 
 /// For a block whose middle pixel is lost, or measures what few others do. @return 0: no measurement
 float Sampling::fill(const DepthPlanes& planes, int s, int t, float* pivot) const {
-  const int column = config_.decimation * s, row = config_.decimation * t;
-  float nearest = std::numeric_limits<float>::max();
+  int nearest = std::numeric_limits<int>::max();
   *pivot = 0;
-  const auto for_each_other = [&](auto visit) {
-    for (int dy = -radius_; dy <= radius_; ++dy)
-      for (int dx = -radius_; dx <= radius_; ++dx) {
-        const float depth = planes.at(column + dx, row + dy);
-        if (depth > 0 && (dx != 0 || dy != 0)) visit(depth, dx, dy);
-      }
-  };
-  for_each_other([&](float depth, int dx, int dy) {
-    const auto distance = static_cast<float>(dx * dx + dy * dy);
-    if (distance >= nearest) return;
+  for_each_pixel_of(planes, s, t, [&](float depth, int dx, int dy) {
+    const int distance = dx * dx + dy * dy;
+    if (depth == 0 || distance == 0 || distance >= nearest) return;
     *pivot = depth;
     nearest = distance;
   });
   if (*pivot == 0 || std::isinf(*pivot)) return 0;
   const float low = lowest(*pivot), high = highest(*pivot);
   float sum = 0;
-  int agree = 0, others = planes.at(column, row) > 0 ? 1 : 0;
-  unsigned sides = 0;  // of four lines through the middle pixel on which pixels lie: two bits each
-  for_each_other([&](float depth, int dx, int dy) {
+  int agree = 0, others = 0;
+  unsigned sides = 0;
+  for_each_pixel_of(planes, s, t, [&](float depth, int dx, int dy) {
+    if (depth == 0) return;
     if (depth < low || depth > high) {
       ++others;
       return;
     }
     sum += depth;
     ++agree;
-    const int across[] = {dx, dy, dx + dy, dx - dy};
-    for (int line = 0; line < 4; ++line) sides |= (across[line] < 0 ? 1U : across[line] > 0 ? 2U : 0U) << (2 * line);
+    sides |= sides_of(dx, dy);
   });
-  return agree >= least_ && agree >= kMostOthers * others && sides == 0xff ? sum / static_cast<float>(agree) : 0;
+  return agree >= least_ && agree >= kMostOthers * others && sides == kAllSides ? sum / static_cast<float>(agree) : 0;
 }
 
 bool Sampling::has_no_return(const DepthPlanes& planes, int s, int t) const {
   int count = 0;
-  for (int dy = -radius_; dy <= radius_; ++dy)
-    for (int dx = -radius_; dx <= radius_; ++dx)
-      count += std::isinf(planes.at(config_.decimation * s + dx, config_.decimation * t + dy)) ? 1 : 0;
+  for_each_pixel_of(planes, s, t, [&](float depth, int, int) { count += std::isinf(depth) ? 1 : 0; });
   return count >= least_;
 }
 

@@ -57,6 +57,13 @@ class Sampling {
   /// @param width, height  of the working image
   SampledDepth sample(const DepthPlanes& planes, int width, int height) const;
 
+  /// Calls visit(depth, dx, dy) for each pixel of block (s, t), row by row. @param visit  dx, dy: from the middle
+  template <typename Visit>
+  void for_each_pixel_of(const DepthPlanes& planes, int s, int t, Visit visit) const {
+    for (int dy = -radius_; dy <= radius_; ++dy)
+      for (int dx = -radius_; dx <= radius_; ++dx) visit(planes.at(config_.decimation * s + dx, config_.decimation * t + dy), dx, dy);
+  }
+
   int radius() const { return radius_; }  ///< a block has 2 radius + 1 pixels along each edge
   float tolerance(float depth) const;     ///< pixels whose depths differ by no more measure the same surface [m]
   float lowest(float pivot) const;        ///< depth of a pixel that agrees with a pivot [m]; never 0
