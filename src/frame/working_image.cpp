@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -72,18 +73,25 @@ std::vector<float> read_depth(const DepthImage& image, const Config& config) {
   return depth;
 }
 
-/// Red, green and blue of a pixel.
-std::array<std::uint32_t, 3> read_color(const ColorImage& image, int column, int row) {
-  const std::uint8_t* pixel = image.data + row * image.step + column * image.channels;
-  const int red = image.order == ColorImage::Order::kRgb ? 0 : 2;
-  return {pixel[red], pixel[1], pixel[2 - red]};
+using Rgb = std::array<std::uint32_t, 3>;
+
+/// @param channels  of a pixel, or their sums over several
+template <typename Channel>
+Rgb read_rgb(const Channel* channels, ColorImage::Order order) {
+  const int red = order == ColorImage::Order::kRgb ? 0 : 2;
+  return {channels[red], channels[1], channels[2 - red]};
 }
 
-std::uint32_t packed(const std::array<std::uint32_t, 3>& rgb) { return rgb[0] | rgb[1] << 8 | rgb[2] << 16; }
+Rgb read_color(const ColorImage& image, int column, int row) {
+  return read_rgb(image.data + row * image.step + column * image.channels, image.order);
+}
 
-using Sums = std::array<std::uint32_t, 3>;
+void add(Rgb& sum, const Rgb& rgb) { std::transform(sum.begin(), sum.end(), rgb.begin(), sum.begin(), std::plus<>()); }
 
-std::uint32_t packed_mean(const Sums& sum, std::uint32_t count) {
+std::uint32_t packed(const Rgb& rgb) { return rgb[0] | rgb[1] << 8 | rgb[2] << 16; }
+
+std::uint32_t packed_mean(const Rgb& sum, int pixels) {
+  const auto count = static_cast<std::uint32_t>(pixels);
   const auto mean = [&](int channel) { return (sum[channel] + count / 2) / count; };
   return packed({mean(0), mean(1), mean(2)});
 }
@@ -99,7 +107,7 @@ class MeanColors {
     add_rows(std::max(row - radius, 0), std::min(row + radius, color_.height - 1));
     for (int s = 0; s < width; ++s) {
       const std::size_t n = colors.size();
-      colors.push_back(sampled.whole[n] ? of_whole_block(decimation_ * s) : of_some(decimation_ * s, row, sampled.pivots[n]));
+      colors.push_back(sampled.whole[n] ? of_whole_block(decimation_ * s) : of_some(s, t, sampled.pivots[n]));
     }
   }
 
@@ -113,32 +121,25 @@ class MeanColors {
   }
 
   std::uint32_t of_whole_block(int column) const {
-    const int red = color_.order == ColorImage::Order::kRgb ? 0 : 2, radius = sampling_.radius(), edge = 2 * radius + 1;
-    Sums sum = {0, 0, 0};
-    const std::uint16_t* of_column = &of_columns_[static_cast<std::size_t>(column - radius) * color_.channels];
-    for (int n = 0; n < edge; ++n, of_column += color_.channels) {
-      sum[0] += of_column[red];
-      sum[1] += of_column[1];
-      sum[2] += of_column[2 - red];
-    }
+    const int radius = sampling_.radius(), edge = 2 * radius + 1;
+    Rgb sum = {0, 0, 0};
+    for (int n = column - radius; n <= column + radius; ++n)
+      add(sum, read_rgb(&of_columns_[static_cast<std::size_t>(n) * color_.channels], color_.order));
     return packed_mean(sum, edge * edge);
   }
 
   /// The middle pixel's if nothing was measured.
-  std::uint32_t of_some(int column, int row, float pivot) const {
+  std::uint32_t of_some(int s, int t, float pivot) const {
+    const int column = decimation_ * s, row = decimation_ * t;
     if (pivot == 0) return packed(read_color(color_, column, row));
     const float lowest = sampling_.lowest(pivot), highest = sampling_.highest(pivot);
-    const int radius = sampling_.radius();
-    Sums sum = {0, 0, 0};
-    std::uint32_t count = 0;
-    for (int y = row - radius; y <= row + radius; ++y)
-      for (int x = column - radius; x <= column + radius; ++x) {
-        const float depth = planes_.at(x, y);
-        if (depth < lowest || depth > highest) continue;
-        const std::array<std::uint32_t, 3> rgb = read_color(color_, x, y);
-        for (int channel = 0; channel < 3; ++channel) sum[channel] += rgb[channel];
-        ++count;
-      }
+    Rgb sum = {0, 0, 0};
+    int count = 0;
+    sampling_.for_each_pixel_of(planes_, s, t, [&](float depth, int dx, int dy) {
+      if (depth < lowest || depth > highest) return;
+      add(sum, read_color(color_, column + dx, row + dy));
+      ++count;
+    });
     return packed_mean(sum, count);
   }
 
