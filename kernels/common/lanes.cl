@@ -13,6 +13,12 @@
 
 #pragma OPENCL FP_CONTRACT OFF
 
+// On a CPU without AVX-512, Clang warns that vectors of 16 are passed to functions in another way than with it. Nothing here is linked with
+// code that was compiled with it, and the warning would be an error.
+#if defined(__clang__)
+#pragma clang diagnostic ignored "-Wpsabi"
+#endif
+
 #define INLINE static inline __attribute__((always_inline))
 #define OVERLOADED __attribute__((overloadable))
 
