@@ -1,4 +1,4 @@
-/// kernels/stages/2_candidates.cl compared exactly with eq. (13), evaluated one voxel at a time.
+/// kernels/stages/4_candidates.cl compared exactly with eq. (13), evaluated one voxel at a time.
 
 #include <gtest/gtest.h>
 

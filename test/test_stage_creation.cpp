@@ -205,7 +205,7 @@ Scene prepare(const CameraSetup& camera, CreationFixture& fixture, double densit
   });
   fixture.write(fixture.observed, scene.observed);
   fixture.write(fixture.candidates, candidates);
-  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.candidates);
+  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), fixture.candidates);
   fixture.write(fixture.known, Field<char>(fixture.grid(), 0));
   fixture.filter();
   candidates = fixture.created();
@@ -259,8 +259,8 @@ std::size_t check_creation(CameraSetup camera, int old_surfels, double density, 
   EXPECT_EQ(old_slots.size(), before);
 
   EXPECT_EQ(fixture.creation.count(), scene.voxels.size());
-  fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.settling, fixture.list,
-                          fixture.map());
+  fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), fixture.settling,
+                          fixture.list, fixture.map());
   EXPECT_EQ(fixture.map().size(), before + scene.voxels.size());
   const std::size_t count = scene.voxels.size();
   const std::vector<std::uint32_t> slots = fixture.access().find_slots(fixture.creation.new_surfels().surfels.read(count),

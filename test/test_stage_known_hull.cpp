@@ -1,4 +1,4 @@
-/// kernels/stages/10_known_hull.cl compared with the projection of every surfel onto every cell of every face.
+/// kernels/stages/12_known_hull.cl compared with the projection of every surfel onto every cell of every face.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// kernels/stages/12_median.cl compared exactly with a count of the 27 voxels.
+/// kernels/stages/14_median.cl compared exactly with a count of the 27 voxels.
 
 #include <gtest/gtest.h>
 

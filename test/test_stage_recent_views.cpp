@@ -28,7 +28,7 @@ double expect_settled(FrameFixture& fixture, const CameraSetup& camera, const st
   const Field<char> candidates = random_field(fixture.grid(), density, random);
   fixture.write(left, candidates);
   ViewSettling settling(fixture.commands());
-  settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), left);
+  settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), left);
   const Nuvg grid(camera.intrinsics, camera.config);
   Field<Truth> expected = grid.field(Truth::no);
   double known = 0, all = 0;

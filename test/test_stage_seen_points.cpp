@@ -290,7 +290,7 @@ TEST_F(SeenPointsTest, CandidatesInSeenSpaceAreSettled) {
       const Field<char> candidates = random_field(fixture_->grid(), density, random_);
       fixture_->write(left, candidates);
       ViewSettling settling(fixture_->commands());
-      settling.settle(fixture_->frame(), fixture_->camera(), fixture_->views(), fixture_->seen(), left);
+      settling.settle(fixture_->frame(), fixture_->camera(), fixture_->views(), fixture_->seen(), fixture_->taken(), left);
       const SeenBits bits(fixture_->seen().saved());
       const Nuvg grid(camera_.intrinsics, camera_.config);
       Field<Truth> expected = grid.field(Truth::no);

@@ -1,4 +1,4 @@
-/// kernels/stages/9_sign_field.cl compared with the dense sign field and the definition of its events, with 1 and with 64 work items per
+/// kernels/stages/11_sign_field.cl compared with the dense sign field and the definition of its events, with 1 and with 64 work items per
 /// tile.
 
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fi
   Candidates candidates(commands);
   SurfelVisit visit(commands);
   candidates.find(fixture.frame(), observed, visit.counters());
-  visit.visit(fixture.frame(), fixture.camera(), observed, column_end, fixture.views(), fixture.map(), candidates);
+  visit.visit(fixture.frame(), fixture.camera(), observed, column_end, fixture.views(), fixture.taken(), fixture.map(), candidates);
   view_surfels.place(fixture.frame(), visit.in_view(), fixture.map());
   for (const ViewSurfel& placed : view_surfels.surfels().read(view_surfels.count())) {
     ViewSurfel& meant = *by_slot.at(placed.slot);

@@ -1,4 +1,4 @@
-/// kernels/stages/3_visit.cl and 4_split.cl: which surfels reach into the grid, how the grid sees them, and how they are split.
+/// kernels/stages/5_visit.cl and 6_split.cl: which surfels reach into the grid, how the grid sees them, and how they are split.
 
 #include <gtest/gtest.h>
 

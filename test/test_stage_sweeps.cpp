@@ -1,4 +1,4 @@
-/// kernels/stages/11_sweeps.cl compared exactly with Algorithm 1, walked one path at a time, on random events.
+/// kernels/stages/13_sweeps.cl compared exactly with Algorithm 1, walked one path at a time, on random events.
 
 #include <gtest/gtest.h>
 

@@ -112,10 +112,10 @@ Tally check(CameraSetup camera, const Setup& setup, double observed_density, boo
   for_each_voxel(all, [&](int i, int j, int k) { all(i, j, k) = all(i, j, k) && !scene.observed(i, j, k); });
   fixture.write(fixture.candidates, all);
 
-  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.candidates);
+  fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), fixture.candidates);
   fixture.list.list(fixture.frame(), fixture.camera(), fixture.observed, fixture.candidates);
   close_thin_gaps(fixture.commands(), fixture.frame(), fixture.camera(), fixture.space.column_end(), fixture.views(),
-                  fixture.settling.tile_views(), fixture.list, fixture.candidates);
+                  fixture.settling.tile_views(), fixture.taken(), fixture.list, fixture.candidates);
   Tally tally;
   Field<Truth> expected = scene.grid.field(Truth::no);
   for_each_voxel(all, [&](int i, int j, int k) {

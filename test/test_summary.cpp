@@ -146,7 +146,7 @@ TEST(Summary, HasExactlyTheKeysOfTheInterface) {
   EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
                               "surfels", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
-  EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "map_bytes", "seen_bytes"}));
+  EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "taken_back", "map_bytes", "seen_bytes"}));
   EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]), (Keys{"sweeps", "median"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]["sweeps"]), (Keys{"mean", "median"}));

@@ -46,6 +46,7 @@ struct Config {
   double recent_view_angle = 0.4;
   bool seen_points = true;
   double seen_spacing = 0;
+  bool take_back = true;
 
   // Removal, creation and labels (paper 3.4, 3.5)
   bool remove_buried = true;
@@ -146,6 +147,11 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
           "is loaded or reopened keeps its own",
           0, 1},
       config.seen_spacing);
+
+  field(FieldInfo{"take_back", "",
+                  "whether a surface that stands where space was seen to be free makes the space behind it unknown again, so that things "
+                  "that are put down appear; only with seen_points"},
+        config.take_back);
 
   group = "Removal, creation and labels";
   field(FieldInfo{"remove_buried", "", "whether surfels whose back is seen by the new frame are removed as well"}, config.remove_buried);

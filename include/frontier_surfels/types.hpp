@@ -150,6 +150,7 @@ struct Report {
   std::size_t surfels = 0;          ///< in the map after the frame
   std::size_t in_view = 0;          ///< surfels that touched the view's grid
   std::size_t measured_pixels = 0;  ///< of the working image: they measure a surface, or free space
+  std::size_t taken_back = 0;       ///< of these pixels: their surface stood in known space, and space behind it became unknown again
   std::size_t created = 0;
   std::size_t removed = 0;
   std::size_t split = 0;      ///< surfels added by splitting; surfels = surfels before + split + created - removed

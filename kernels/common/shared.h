@@ -102,6 +102,9 @@ namespace frontier_surfels {
 #define SEEN_MIXED 1
 #define SEEN_ALL 2
 
+// Frames that are asked whether they support a surface. - Ours
+#define LAST_FRAMES 8
+
 // More bricks around the candidates of a tile are not looked at to find out whether all are alike.
 #define SEEN_MOST_BRICKS 64
 
@@ -135,7 +138,17 @@ namespace frontier_surfels {
 #define PROBES 2
 #define FIRST_VIEWS 6
 
+// Taking back - ours: all pixels of a square of TAKE_SQUARE x TAKE_SQUARE must have strong evidence, and pixels within TAKE_GROWTH of its
+// middle need weak evidence only [pixel].
+#define TAKE_SQUARE 7
+#define TAKE_GROWTH 5
+
 // Names of numbers -----------------------------------------------------------------------------------------------------------------------
+
+// Evidence that a measured surface stands in known space.
+#define NO_EVIDENCE 0
+#define WEAK_EVIDENCE 1
+#define STRONG_EVIDENCE 2
 
 // Numbers of surfels that kernels count as they go.
 #define COUNT_IN_VIEW 0
@@ -232,6 +245,16 @@ typedef struct {
   SHARED_INT refine;         // new surfels leave the centre and the mean direction of their voxel - ours
 } Limits;
 
+// Limits of taking back (stages/2_evidence.cl) - ours.
+typedef struct {
+  float noise, noise_growth, quantisation;    // the sensor: parameters of the same names
+  float support_margin;                       // another frame supports a surface that it measures within this of it [voxel]
+  float weak_margin, strong_margin;           // a view contradicts a surface if it sees farther by this [voxel]
+  float reach;                                // so far behind a surface space is taken back [voxel]
+  SHARED_INT weak_supports, strong_supports;  // of the last frames
+  SHARED_INT contradictions, opinions;        // kept views that must contradict a surface, and those that may have an opinion
+} TakeBackLimits;
+
 // What every stage of a frame is told.
 typedef struct {
   Grid grid;
@@ -240,7 +263,8 @@ typedef struct {
   Transform T_camera_local, T_local_camera;  // local: the window's frame
   View own_view;                             // of this frame, as its own camera sees it
   SHARED_INT has_color;
-  SHARED_INT has_seen, seen_shift;  // is any point of the lattice seen?  log2 of the bricks along a block's edge
+  SHARED_INT has_seen, has_taken;  // is any point of the lattice seen?  is any taken back?
+  SHARED_INT seen_shift;           // log2 of the bricks along a block's edge
 } Frame;
 
 #ifndef __OPENCL_VERSION__
@@ -250,7 +274,8 @@ static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 14 * 4, "Limits must have no padding");
-static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 3) * 4, "Frame must have no padding");
+static_assert(sizeof(TakeBackLimits) == 11 * 4, "TakeBackLimits must have no padding");
+static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 4) * 4, "Frame must have no padding");
 }  // namespace frontier_surfels
 #endif
 

@@ -181,6 +181,17 @@ View RecentViews::to_view(const Kept& kept, const Eigen::Isometry3d& T_view_came
 
 View RecentViews::own_view() const { return to_view(current_, Eigen::Isometry3d::Identity()); }
 
+View RecentViews::view_from_current(const Intrinsics& intrinsics, const Eigen::Isometry3d& T_world_camera) const {
+  return to_view({intrinsics, T_world_camera, 0, 0, 0}, T_world_camera.inverse() * current_.T_world_camera);
+}
+
+std::vector<View> RecentViews::views_before(std::uint64_t frames) const {
+  std::vector<View> views;
+  for (const Kept& kept : kept_)
+    if (kept.number + frames < current_.number) views.push_back(to_view(kept, kept.T_world_camera.inverse() * current_.T_world_camera));
+  return views;
+}
+
 int RecentViews::prepare() {
   std::vector<View> views;
   std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * VIEW_GROUP, 0.0F);

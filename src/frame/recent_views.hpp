@@ -44,6 +44,15 @@ class RecentViews {
   void make_room(const std::vector<SavedView>& views);
 
   View own_view() const;  ///< the current view, seen from its own camera
+  View own_view_from(const Eigen::Isometry3d& T_camera_local) const {
+    return to_view(current_, T_camera_local);
+  }  ///< from the frame `local`
+
+  /// Any view as this frame's camera sees it, without an image.
+  View view_from_current(const Intrinsics& intrinsics, const Eigen::Isometry3d& T_world_camera) const;
+
+  /// The kept views that are older than so many frames before the current one, newest first.
+  std::vector<View> views_before(std::uint64_t frames) const;
 
   /// Sends the kept views to the device, each with its pose relative to the current camera. @return their number
   int prepare();

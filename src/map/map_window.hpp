@@ -28,7 +28,7 @@ class MapWindow {
   int cells() const { return window_.size_x * window_.size_y * window_.size_z; }
   BlockKey block(int cell) const;  ///< the block that a cell of the window stands for
 
-  /// May a surfel of this block be in view? True for every block with a surfel that kernels/stages/3_visit.cl finds in view.
+  /// May a surfel of this block be in view? True for every block with a surfel that kernels/stages/5_visit.cl finds in view.
   bool meets_grid(const BlockKey& block) const;
 
   /// All blocks within `distance` [m] of the window, with or without surfels; none if there are more than `max_count`.

@@ -53,6 +53,7 @@ class SeenPoints {
 
   /// Number of a block's table; made if the block has none.
   int table(const BlockKey& block);
+  bool has_table(const BlockKey& block) const { return table_of_.count(block) != 0; }
   cl_int entry(int table, int brick) const { return tables_[at(table, brick)]; }
   int bricks_of_block() const { return 1 << (3 * shift_); }
   bool is_full(int table) const { return full_bricks_[table] == bricks_of_block(); }  ///< are all points of the block seen?
@@ -60,6 +61,7 @@ class SeenPoints {
   /// @name Changes of entries. They reach the device with send_entries().
   /// @{
   cl_int add_brick(int table, int brick);  ///< a brick of its own, without seen points, for a place that has none. @return its number
+  cl_int own_brick(int table, int brick);  ///< gives the brick words of its own, if it has none, with the points it has. @return its number
   void set_uniform(int table, int brick, bool seen);  ///< all points of the brick are seen, or none; a brick of its own becomes free
   void send_entries(const char* stage);
   /// @}

@@ -45,6 +45,7 @@ Report to_report(const FrameReport& message) {
   report.surfels = message.surfels;
   report.in_view = message.in_view;
   report.measured_pixels = message.measured_pixels;
+  report.taken_back = message.taken_back;
   report.created = message.created;
   report.removed = message.removed;
   report.split = message.split;

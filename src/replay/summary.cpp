@@ -53,6 +53,12 @@ double total_ms(const FrameRecord& frame) { return frame.report.total_ms; }
 
 double cpu_ms(const FrameRecord& frame) { return frame.cpu_ms; }
 
+std::size_t taken_back(const std::vector<FrameRecord>& frames) {
+  std::size_t pixels = 0;
+  for (const FrameRecord& frame : frames) pixels += frame.report.taken_back;
+  return pixels;
+}
+
 bool cpu_is_measured(const std::vector<FrameRecord>& frames) {
   return std::all_of(frames.begin(), frames.end(), [](const FrameRecord& frame) { return frame.cpu_ms > 0; });
 }
@@ -150,11 +156,9 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
   json["skipped"] = run.skipped;
   json["config"] = config_json(run.config);
   json["device"] = run.device;
-  json["surfels"] = {{"total", run.statistics.surfels},
-                     {"occupied", run.statistics.occupied},
-                     {"frontier", run.statistics.frontier},
-                     {"map_bytes", run.statistics.map_bytes},
-                     {"seen_bytes", run.statistics.seen_bytes}};
+  json["surfels"] = {{"total", run.statistics.surfels},       {"occupied", run.statistics.occupied},
+                     {"frontier", run.statistics.frontier},   {"taken_back", taken_back(run.frames)},
+                     {"map_bytes", run.statistics.map_bytes}, {"seen_bytes", run.statistics.seen_bytes}};
   json["time_ms"] = time_json(warm, stage_names(run.frames));
   if (cpu_is_measured(warm)) json["cpu_ms"] = mean_and_median(column(warm, cpu_ms));
   json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
@@ -227,6 +231,8 @@ std::string result_table(const ordered_json& summary) {
   table += formatted("frames      %.0f, %.0f skipped\n", input["frames"], input["skipped"]);
   table += formatted("surfels     %.0f: %.0f occupied, %.0f frontier; %.1f MB\n", surfels["total"], surfels["occupied"],
                      surfels["frontier"], surfels["map_bytes"].get<double>() / 1e6);
+  if (surfels["taken_back"] > 0)
+    table += formatted("taken back  at %.0f places: surfaces that stood where space was seen to be free before\n", surfels["taken_back"]);
   table +=
       formatted("time        median %.1f ms a frame, 95 %% below %.1f ms, at most %.1f ms\n", time["median"], time["p95"], time["max"]);
   const auto percent = [](const ordered_json& share) { return 100 * share.get<double>(); };

@@ -1,4 +1,4 @@
-/// Voxels where new surfels may be created - paper 3.5, eq. (13); kernels/stages/2_candidates.cl and 6_directions.cl.
+/// Voxels where new surfels may be created - paper 3.5, eq. (13); kernels/stages/4_candidates.cl and 8_directions.cl.
 #pragma once
 
 #include "opencl/lists.hpp"

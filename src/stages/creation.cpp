@@ -19,13 +19,13 @@ std::size_t Creation::filter(const Frame& frame, const CandidateList& list, cons
   return count_;
 }
 
-void Creation::create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen,
+void Creation::create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
                       const ViewSettling& settling, const CandidateList& list, SurfelMap& map) {
   const char* stage = "creation";
   commands_.run(stage, "create_surfels", commands_.chunks(count_), commands_.device().heavy_group(), frame, views.views(),
                 settling.tile_views()(), static_cast<cl_int>(views.view_groups()), views.depths(), camera.layer_depth()(), seen.slots(),
-                seen.tables(), seen.brick_words(), settling.tile_seen()(), chosen_(), static_cast<cl_int>(count_), list.voxels()(),
-                list.around()(), list.directions()(), new_.surfels(), new_.cells());
+                seen.tables(), seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), settling.tile_seen()(), chosen_(),
+                static_cast<cl_int>(count_), list.voxels()(), list.around()(), list.directions()(), new_.surfels(), new_.cells());
   map.insert(stage, new_.surfels, new_.cells, count_);
 }
 

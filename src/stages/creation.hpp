@@ -1,4 +1,4 @@
-/// New surfel filter and creation - paper 3.5, eq. (14)-(16); kernels/stages/13_new_surfel_filter.cl and 15_creation.cl.
+/// New surfel filter and creation - paper 3.5, eq. (14)-(16); kernels/stages/15_new_surfel_filter.cl and 17_creation.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"
@@ -20,8 +20,8 @@ class Creation {
   std::size_t filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
 
   /// Makes surfels of the chosen candidates and puts them into the map.
-  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const ViewSettling& settling,
-              const CandidateList& list, SurfelMap& map);
+  void create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
+              const ViewSettling& settling, const CandidateList& list, SurfelMap& map);
 
   std::size_t count() const { return count_; }
   const DeviceArray<cl_uint>& chosen() const { return chosen_; }  ///< [count]: place of each in the list of candidates, ascending

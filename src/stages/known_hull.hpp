@@ -1,4 +1,4 @@
-/// Known state hull - paper, supplement C: the states in which paths enter the grid; kernels/stages/10_known_hull.cl.
+/// Known state hull - paper, supplement C: the states in which paths enter the grid; kernels/stages/12_known_hull.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"
@@ -17,7 +17,7 @@ class KnownHull {
   void compute(const Frame& frame, const NeededPaths& needed, const SurfelMap& map);
 
   /// A bit for each path that enters the grid: is it in known space there? Faces follow each other (hull_word_offset in
-  /// kernels/stages/10_known_hull.cl). Only the bits of needed paths are valid.
+  /// kernels/stages/12_known_hull.cl). Only the bits of needed paths are valid.
   const BitField& states() const { return states_; }
   static std::size_t size(const Grid& grid);
 

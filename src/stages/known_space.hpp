@@ -1,4 +1,4 @@
-/// Known space K~ from the surfels - paper 3.2, Algorithm 1, supplements B and C; kernels/stages/8_needed_paths.cl to 12_median.cl.
+/// Known space K~ from the surfels - paper 3.2, Algorithm 1, supplements B and C; kernels/stages/10_needed_paths.cl to 14_median.cl.
 ///
 /// Decides about the candidates that no kept view knows. Its fields take more memory than those of all other stages together, so a mapper
 /// makes a KnownSpace only once views have been forgotten.

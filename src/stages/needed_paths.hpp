@@ -1,4 +1,4 @@
-/// The paths of the grid that section 3.2 of the paper must walk: those near a candidate; kernels/stages/8_needed_paths.cl.
+/// The paths of the grid that section 3.2 of the paper must walk: those near a candidate; kernels/stages/10_needed_paths.cl.
 #pragma once
 
 #include "stages/candidates.hpp"

@@ -1,4 +1,4 @@
-/// Sweeps - paper 3.2, Algorithm 1, eq. (5)-(7) - and median - eq. (8); kernels/stages/11_sweeps.cl and 12_median.cl.
+/// Sweeps - paper 3.2, Algorithm 1, eq. (5)-(7) - and median - eq. (8); kernels/stages/13_sweeps.cl and 14_median.cl.
 #pragma once
 
 #include "stages/candidates.hpp"

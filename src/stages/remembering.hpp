@@ -1,4 +1,4 @@
-/// What a view has seen that is not kept, or is forgotten, is remembered as seen points - ours; kernels/stages/17_remembering.cl.
+/// What a view has seen that is not kept, or is forgotten, is remembered as seen points - ours; kernels/stages/19_remembering.cl.
 #pragma once
 
 #include "frame/recent_views.hpp"

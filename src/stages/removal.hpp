@@ -1,5 +1,5 @@
 /// Removal - paper 3.4, eq. (12) - and labels - 3.5. Both carry out what SurfelVisit has decided;
-/// kernels/stages/14_removal.cl and 16_labels.cl.
+/// kernels/stages/16_removal.cl and 18_labels.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"

@@ -1,4 +1,4 @@
-/// Inner product sign field D - paper eq. (4), supplement B - and the events that paths meet in it; kernels/stages/9_sign_field.cl.
+/// Inner product sign field D - paper eq. (4), supplement B - and the events that paths meet in it; kernels/stages/11_sign_field.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"

@@ -1,4 +1,4 @@
-/// Split of surfels that are too large for this view - paper 3.4; kernels/stages/4_split.cl.
+/// Split of surfels that are too large for this view - paper 3.4; kernels/stages/6_split.cl.
 #pragma once
 
 #include "map/surfel_map.hpp"

@@ -1,4 +1,4 @@
-/// The pass over the surfels around the view; kernels/stages/3_visit.cl. It finds the surfels that the grid sees, those of them that are
+/// The pass over the surfels around the view; kernels/stages/5_visit.cl. It finds the surfels that the grid sees, those of them that are
 /// too large - paper 3.4 - and those to be removed - eq. (12). Surfels to be labelled are marked as changed in the map.
 #pragma once
 
@@ -18,9 +18,10 @@ class SurfelVisit {
 
   /// Clears the candidates in the voxels of surfels that stay. No surfel leaves the map yet.
   /// @param observed, column_end  of ObservedSpace
+  /// @param taken                 TakingBack::taken()
   /// @param candidates            of this frame; Candidates::find() must have set counters() to zero
   Found visit(const Frame& frame, const Camera& camera, const BitField& observed, const DeviceArray<cl_int>& column_end,
-              const RecentViews& views, SurfelMap& map, Candidates& candidates);
+              const RecentViews& views, const SeenPoints& taken, SurfelMap& map, Candidates& candidates);
 
   DeviceArray<cl_uint>& counters() { return counts_; }
 

@@ -4,7 +4,8 @@
 
 namespace frontier_surfels {
 
-void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, Candidates& candidates) {
+void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
+                          Candidates& candidates) {
   const int count = views.prepare();
   const std::size_t columns = tile_columns(frame.grid), group = commands_.device().heavy_group();
   tile_views_.resize(std::max<std::size_t>(columns * (64 / VIEW_TILE_K) * views.view_groups(), 1));  // kernels take no empty buffer
@@ -12,7 +13,7 @@ void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews&
   if (count == 0 && seen.empty()) return;
   commands_.run("recent_views", "settle_candidates", columns * group, group, frame, views.views(), views.view_lanes(),
                 static_cast<cl_int>(count), views.depths(), camera.layer_depth()(), seen.slots(), seen.tables(), seen.brick_words(),
-                tile_views_(), tile_seen_(), candidates.bits()());
+                taken.slots(), taken.tables(), taken.brick_words(), tile_views_(), tile_seen_(), candidates.bits()());
 }
 
 }  // namespace frontier_surfels

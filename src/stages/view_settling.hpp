@@ -1,4 +1,4 @@
-/// Recent views - our addition to the paper: candidates that a kept view has seen are known, and settled; kernels/stages/5_recent_views.cl.
+/// Recent views - our addition to the paper: candidates that a kept view has seen are known, and settled; kernels/stages/7_recent_views.cl.
 #pragma once
 
 #include "stages/candidates.hpp"
@@ -10,8 +10,10 @@ class ViewSettling {
  public:
   explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands), tile_seen_(commands) {}
 
-  /// Clears the candidates whose centre a kept view has seen, or an earlier one by the points that are remembered of it.
-  void settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, Candidates& candidates);
+  /// Clears the candidates whose centre a kept view has seen, or an earlier one by the points that are remembered of it. Those at points
+  /// that were taken back stay. @param taken  TakingBack::taken()
+  void settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
+              Candidates& candidates);
 
   /// [tiles of the grid][groups of VIEW_GROUP views]: a bit for each view that may know something near the candidates left in a tile. Tiles
   /// without candidates have no valid bits.

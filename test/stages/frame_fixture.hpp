@@ -22,6 +22,7 @@ class FrameFixture {
         lists_(commands),
         map_(commands, lists_, config),
         seen_(commands, map_.block_size()),
+        taken_(commands, map_.block_size()),
         views_(commands, config),
         cameras_(commands, config),
         access_(commands, map_) {
@@ -33,6 +34,7 @@ class FrameFixture {
     camera_ = &cameras_.find(image.intrinsics);
     map_.open_window(camera_->grid(), T_world_camera);
     seen_.open_window(map_.window());
+    taken_.open_window(map_.window());
     camera_->set_image(image);
     views_.set_current(image, T_world_camera);
     frame_ = make_frame(*camera_, map_.window(), views_, &seen_, limits_);
@@ -48,6 +50,7 @@ class FrameFixture {
   SurfelMap& map() { return map_; }
   const SurfelMap& map() const { return map_; }
   SeenPoints& seen() { return seen_; }
+  SeenPoints& taken() { return taken_; }  ///< empty, unless a test fills it
 
   /// Ends the frame. @return what it has changed
   Changes finish(std::uint32_t frame) {
@@ -109,7 +112,7 @@ class FrameFixture {
   const Limits limits_;
   Lists lists_;
   SurfelMap map_;
-  SeenPoints seen_;
+  SeenPoints seen_, taken_;
   RecentViews views_;
   Cameras cameras_;
   MapAccess access_;

@@ -28,7 +28,7 @@ struct VisitFixture : FrameFixture {
   void find_candidates(const BitField& with) { candidates.find(frame(), with, visit.counters()); }
 
   SurfelVisit::Found look(const BitField& with) {
-    return visit.visit(frame(), camera(), with, space.column_end(), views(), map(), candidates);
+    return visit.visit(frame(), camera(), with, space.column_end(), views(), taken(), map(), candidates);
   }
   SurfelVisit::Found look() { return look(space.bits()); }
 

@@ -254,6 +254,7 @@ FrameReport to_message(const Report& report) {
   message.surfels = count32(report.surfels);
   message.in_view = count32(report.in_view);
   message.measured_pixels = count32(report.measured_pixels);
+  message.taken_back = count32(report.taken_back);
   message.created = count32(report.created);
   message.removed = count32(report.removed);
   message.split = count32(report.split);

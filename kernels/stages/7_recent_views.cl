@@ -2,14 +2,19 @@
 //
 // A tile's candidates are listed, and kept views asked of all of them, LANES at once; a candidate that one knows is settled. The views that
 // know some of a few probes are asked first, as they settle most. What is left has a box, and the other views that may know something of
-// that box are asked; 7_thin_gaps and 15_creation ask the same ones.
+// that box are asked; 9_thin_gaps and 17_creation ask the same ones.
 
 #define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
 #define TILE_CHUNKS (TILE_ENTRIES / LANES)
 
+//
+// Candidates at points that were taken back (3_taking_back) stay, whatever the views know: no view is asked for them, neither here nor
+// later.
+
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
   ulong words[TILE_COLUMNS];             // candidates
+  ulong taken[TILE_COLUMNS];             // those of them that are taken back
   ulong layers;                          // that have one in any column
   ushort entries[TILE_ENTRIES + LANES];  // the tile's candidates, VIEW_TILE_K column + layer
   uint entry_count;
@@ -30,7 +35,10 @@ INLINE ulong all_bits(ulong8 words) {
 // Loads the words of the tiles one above the other.
 INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
   const int item = get_local_id(0), items = get_local_size(0);
-  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, candidates), row, own->words);
+  for (int row = item; row < VIEW_TILE; row += items) {
+    vstore8(vload8(row, candidates), row, own->words);
+    vstore8((ulong8)(0), row, own->taken);
+  }
   barrier(CLK_LOCAL_MEM_FENCE);
   if (item == 0) {
     ulong8 words = 0;
@@ -158,6 +166,32 @@ INLINE uint open_chunks(const Grid* g, int3 tile, __global const float* layer_de
   return count;
 }
 
+// Takes those off a tile's list that lie at points that were taken back, and notes them. Returns whether any point near the tile's
+// candidates was taken back.
+INLINE bool set_taken_aside(const Frame* f, const SeenPoints* taken, int3 tile, __global const float* layer_depth, __local Tile* own) {
+  Box box;
+  find_candidates_box(&f->grid, own, tile, layer_depth, f->limits.min_gap, &box);
+  if (seen_in_box(f, taken, &box) == SEEN_NONE) return false;
+  const int item = get_local_id(0), items = get_local_size(0);
+  const uint chunks = open_chunks(&f->grid, tile, layer_depth, own);
+  for (uint n = 0; n < chunks; ++n) {
+    const int chunk = own->chunks[n * items + item];
+    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
+    const intv open = lane_marks(own->open[chunk]);
+    own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, taken, center, open));
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item == 0) {
+    const int first_bit = tile.z * VIEW_TILE_K % 64;
+    for (uint n = 0; n < own->entry_count; ++n)
+      if ((own->open[n / LANES] >> (n % LANES) & 1) == 0)
+        own->taken[own->entries[n] / VIEW_TILE_K] |= 1ul << (first_bit + own->entries[n] % VIEW_TILE_K);
+    drop_settled(own);
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  return true;
+}
+
 // Asks a view of all chunks of a work item, one after the other: what is asked of one does not wait for another, and no branch has to be
 // guessed. Returns how many have entries left.
 INLINE uint ask_view(const View* view, __global const ushort* depths, uint chunks, __local Tile* own) {
@@ -219,20 +253,21 @@ INLINE int ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __globa
 // One work-group has the tiles of a word of VIEW_TILE x VIEW_TILE columns, 64 / VIEW_TILE_K tiles one above the other: group
 // (tile_j words_k + w) tiles_i + tile_i.
 //   in  views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
-//       slots, tables, bricks: of the seen points (common/seen_points.cl)
+//       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
 //       near them
 //       tile_seen[tiles_j][tiles_k][tiles_i]: for the same tiles, how many of the lattice points near them are seen
-//   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared
+//   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared, unless they were taken back
 __kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
-                                __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                                __global const int* tables, __global const int* bricks, __global ushort* tile_views,
+                                __global const ushort* depths, __global const float* layer_depth, __global const int* seen_slots,
+                                __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
+                                __global const int* taken_tables, __global const int* taken_bricks, __global ushort* tile_views,
                                 __global uchar* tile_seen, __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
             view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
   const int group = get_group_id(0), tiles_i = grid_tiles(f.grid.size_i);
   __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
-  const SeenPoints seen = {slots, tables, bricks};
+  const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
   __local Tile own;
   load_words(own_candidates, &own);
   if (own.layers == 0) return;
@@ -240,10 +275,17 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
   int3 tile = (int3)(group % tiles_i, group / tiles_i / f.grid.words_k, group / tiles_i % f.grid.words_k * tiles_of_word);
   for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
     if (tile_layers(own.layers, tile) == 0) continue;
+    const int tile_number = (tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x;
+    __global ushort* own_views = tile_views + tile_number * view_groups;
+    if (item == 0) list_entries(&own, tile);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (f.has_taken && set_taken_aside(&f, &taken, tile, layer_depth, &own)) {
+      for (int n = item; n < view_groups; n += items) own_views[n] = 0;  // no candidate may be left that sets them
+      if (item == 0) tile_seen[tile_number] = SEEN_NONE;
+    }
     if (item == 0) {
-      list_entries(&own, tile);
       own.view_count = own.likely_views = 0;
-      if (view_count > 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
+      if (view_count > 0 && own.entry_count != 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&f.grid, tile, layer_depth, views, depths, &own);
@@ -253,14 +295,13 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
       const int in_box = f.has_seen ? ask_memory(&f, &seen, tile, layer_depth, &box, &own) : SEEN_NONE;
-      if (item == 0) tile_seen[(tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x] = (uchar)in_box;
+      if (item == 0) tile_seen[tile_number] = (uchar)in_box;
     }
     if (own.entry_count != 0) {
       if (item == 0) keep_entries(&own, tile);
       barrier(CLK_LOCAL_MEM_FENCE);
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
-      __global ushort* own_views = tile_views + ((tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x) * view_groups;
       for (int n = item; n < view_groups; n += items)
         own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, &box);
       barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
@@ -272,5 +313,5 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
     barrier(CLK_LOCAL_MEM_FENCE);
   }
 
-  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, own.words), row, own_candidates);
+  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, own.words) | vload8(row, own.taken), row, own_candidates);
 }

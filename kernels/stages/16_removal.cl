@@ -1,4 +1,4 @@
-// Removal - paper 3.4, eq. (12) - of the surfels that 3_visit has decided on.
+// Removal - paper 3.4, eq. (12) - of the surfels that 5_visit has decided on.
 
 // One work item handles a page of the window: slots of removed surfels become free.
 //   in  pages[count], removed[count]: a bit for each surfel of the page;   i/o alive, changed: of the map

@@ -1,6 +1,6 @@
 // Labels and colour - paper 3.5: a surfel where a column of observed voxels ends at a measured surface is occupied, for ever.
 
-// One work item handles LANES surfels of a page of the window, those of them that are new and those that 3_visit has found at a surface;
+// One work item handles LANES surfels of a page of the window, those of them that are new and those that 5_visit has found at a surface;
 // work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
 //   in  changed: which surfels they are;  depth, column_end: of 1_observed_space
 //       color[height][width]: red | green << 8 | blue << 16, if has_color

@@ -1,7 +1,7 @@
 // Visit of the window's surfels: all that a frame asks of them, in one pass. Which are in view, and which of these must be split -
-// paper 3.4; which are removed - eq. (12): surfels in observed space go -; and which 16_labels is to label. Voxels of surfels that stay are
+// paper 3.4; which are removed - eq. (12): surfels in observed space go -; and which 18_labels is to label. Voxels of surfels that stay are
 // no candidates for new ones. Ours: surfels go also where this frame has seen their back, and frontier on a sheet of unknown thinner than
-// min_gap.
+// min_gap; and those that float in space that was taken back.
 
 // Which of LANES surfels have an ellipsoid that may reach into the grid, generously.
 //   s: camera frame;  voxel: voxel_size at each of them
@@ -25,6 +25,15 @@ INLINE intv are_seen_through(const Limits* limits, const View* view, __global co
     gone |= own_view_knows(view, depths, add_scaled(s->position, -limits->min_gap, normal),
                            asked & ~gone & MARK((s->attributes & SURFEL_OCCUPIED) == 0));
   return gone;
+}
+
+// Which surfels float: the space before them, which should be known, was taken back, and this frame does not see it.
+//   s, normal: camera frame
+INLINE intv are_floating(const Frame* f, const SeenPoints* taken, __global const ushort* depths, const Surfels* s, Points normal,
+                         intv asked) {
+  const Points front = add_scaled(s->position, f->limits.front_probe / f->limits.create_radius * s->radius, normal);
+  const intv floating = seen_before(f, taken, front, asked);
+  return any_lane(floating) ? floating & ~own_view_knows(&f->own_view, depths, front, floating) : 0;
 }
 
 // Takes voxels off the candidates.
@@ -52,16 +61,19 @@ typedef struct {
 // One work item handles LANES surfels of a page; work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
 //   in  pages[count]: those of the window;  depths: images of views, this frame's among them;  depth, column_end: of 1_observed_space
 //       alive, page_block, surfels: the map;  observed: bit field C~, as 32-bit halves
+//       slots, tables, bricks: of points that were taken back (common/seen_points.cl)
 //   i/o candidates: bit field by tiles, as 32-bit halves: voxels of surfels that stay are taken off
-//       changed: bits of surfels that stay and that 16_labels will label are set
+//       changed: bits of surfels that stay and that 18_labels will label are set
 //       counts[COUNTS]: COUNT_IN_VIEW, COUNT_LARGE, COUNT_REMOVED and COUNT_LABELLED are added to
 //   out in_view[count], large[count], removed[count]: a bit for each surfel of each page
 __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surfels(
     const Frame f, __global const ushort* depths, __global const float* depth, __global const int* column_end, __global const uint* pages,
     const uint count, __global const ulong* alive, __global const int4* page_block, __global const uint4* surfels,
-    __global const int* observed, __global int* candidates, __global ulong* changed, __global ulong* in_view, __global ulong* large,
-    __global ulong* removed, __global uint* counts) {
+    __global const int* observed, __global const int* slots, __global const int* tables, __global const int* bricks,
+    __global int* candidates, __global ulong* changed, __global ulong* in_view, __global ulong* large, __global ulong* removed,
+    __global uint* counts) {
   __local PageFindings of_pages[PAGE_GROUP / PAGE_ITEMS];
+  const SeenPoints taken = {slots, tables, bricks};
   const uint n = get_global_id(0) / PAGE_ITEMS, item = get_local_id(0) % PAGE_ITEMS;
   __local PageFindings* of_page = &of_pages[get_local_id(0) / PAGE_ITEMS];
   const uint page = pages[min(n, count - 1)], first = PAGE_SLOTS * page + LANES * item;
@@ -87,6 +99,7 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
       intv stay = is_candidate | (rest & MARK((gather_int(observed, at) & bit) == 0));
       const Points normal = rotated(&f.T_camera_local, unpack_normals(s.normal));
       stay &= ~are_seen_through(&f.limits, &f.own_view, depths, &s, normal, stay);
+      if (f.has_taken) stay &= ~are_floating(&f, &taken, depths, &s, normal, stay);
       found.removed = lane_bits(inside & ~stay);
       intv pixel;
       const intv unlabelled = stay & lack_label(s.attributes, f.has_color);

@@ -1,52 +1,6 @@
 // Remembering: what a view has seen that is not kept, or is forgotten, becomes seen points (common/seen_points.cl) - ours. The points of
 // the lattice that the view knows are set, exactly those: the shortcuts for whole bricks decide only how long it takes.
 
-// Does a view know every point in a rectangle of its image up to the depth `far`?
-//   pixels: first column and row, last column and row
-INLINE bool is_open(const View* view, __global const ushort* depths, int4 pixels, float far) {
-  const int columns = (view->width + VIEW_BLOCK - 1) / VIEW_BLOCK, rows = (view->height + VIEW_BLOCK - 1) / VIEW_BLOCK;
-  const int4 blocks = pixels / VIEW_BLOCK;
-  const int patches = (view->width + PATCH_COLUMNS - 1) / PATCH_COLUMNS * ((view->height + PATCH_ROWS - 1) / PATCH_ROWS);
-  __global const ushort* smallest = depths + view->first_pixel + patches * PATCH_COLUMNS * PATCH_ROWS + columns * rows;
-  for (int t = blocks.y; t <= blocks.w; ++t)
-    for (int s = blocks.x; s <= blocks.z; ++s)
-      if ((float)smallest[t * columns + s] * view->depth_step <= far) return false;
-  return true;
-}
-
-INLINE float least(float8 v) {
-  const float4 of_4 = fmin(v.lo, v.hi);
-  const float2 of_2 = fmin(of_4.lo, of_4.hi);
-  return fmin(of_2.x, of_2.y);
-}
-
-// Does a view know none, some or all of the points of a cube? SEEN_MIXED also where that is not clear.
-//   center, half_size: of the cube, in the frame of view->to_image [m]
-INLINE int cube_in_view(const View* view, __global const ushort* depths, float3 center, float half_size) {
-  const Transform* T = &view->to_image;
-  const float8 x = (float8)(-1, 1, -1, 1, -1, 1, -1, 1) * half_size + center.x,
-               y = (float8)(-1, -1, 1, 1, -1, -1, 1, 1) * half_size + center.y,
-               z = (float8)(-1, -1, -1, -1, 1, 1, 1, 1) * half_size + center.z;
-  const float8 depth = T->r20 * x + T->r21 * y + T->r22 * z + T->t2;
-  const float slack = 1e-5f * (fabs(T->t2) + fabs(center.x) + fabs(center.y) + fabs(center.z)) + 1e-5f;  // of float
-  const float near = least(depth) - slack, far = -least(-depth) + slack;
-  if (far <= 0.0f) return SEEN_NONE;
-  if (near <= 0.01f) return SEEN_MIXED;
-  const float8 s = (T->r00 * x + T->r01 * y + T->r02 * z + T->t0) / depth, t = (T->r10 * x + T->r11 * y + T->r12 * z + T->t1) / depth;
-  const float pixel_slack = 0.02f, width = (float)view->width, height = (float)view->height;
-  const float left = least(s) - pixel_slack, right = -least(-s) + pixel_slack, top = least(t) - pixel_slack,
-              bottom = -least(-t) + pixel_slack;
-  if (right < 0.0f || bottom < 0.0f || left >= width || top >= height) return SEEN_NONE;
-  const int4 pixels = (int4)((int)clamp(left, 0.0f, width - 1.0f), (int)clamp(top, 0.0f, height - 1.0f),
-                             (int)clamp(right, 0.0f, width - 1.0f), (int)clamp(bottom, 0.0f, height - 1.0f));
-  if (is_hidden(view, depths, pixels, near)) return SEEN_NONE;
-  const bool inside = left >= 0.0f && top >= 0.0f && right < width && bottom < height;
-  return inside && is_open(view, depths, pixels, far) ? SEEN_ALL : SEEN_MIXED;
-}
-
-// Edge of the lattice's cells [m].
-INLINE float seen_spacing(const Window* window, int shift) { return window->block_size / (float)(SEEN_BRICK << shift); }
-
 // One work item handles a brick of a block.
 //   in  window: of these blocks;  view: from the window's frame to its image;  depths: its image
 //       blocks[count]: x, y, z from the window's corner, and the number of the block's table
@@ -64,12 +18,6 @@ __kernel void find_seen_bricks(const Window window, const View view, const int s
   }
   found[get_global_id(0)] = adds;
 }
-
-// Words along an edge of the cubes that one work item of see_points handles, and such cubes in a brick: a cube that the view knows nothing
-// of is done with at once.
-#define SEE_EDGE (LANES == 1 ? 1 : 2)
-#define SEE_WORD(w) ((((w) >> 2) * 4 + ((w) >> 1 & 1)) * 4 + ((w)&1))  // of word w of a cube, from its first one
-#define SEE_CUBES (SEEN_WORDS / (SEE_EDGE * SEE_EDGE * SEE_EDGE))
 
 // One work item handles a cube of words of a brick.
 //   in  seen_by[count]: x, y, z of a brick, counted in bricks from the window's corner, and its number

@@ -33,8 +33,9 @@ INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* vi
 
 // Positions of new surfels in their voxels: they slide along their normals until they are near the boundary, by whole steps. A step is left
 // in hand before what this view or a kept one knows, and a surfel that has known space at front_probe before it does not lose it.
+//   taken: marks of those at points that were taken back, for which this view alone counts
 INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, bool ask_seen,
-                                __global const ushort* depths, Voxels v, Points center, Points normal, intv asked) {
+                                __global const ushort* depths, Voxels v, Points center, Points normal, intv taken, intv asked) {
   const Grid* g = &f->grid;
   const Limits* limits = &f->limits;
   const View* view = &f->own_view;
@@ -50,7 +51,7 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
     moving &= ~has_front | own_view_knows(view, depths, add_scaled(next, 1.0f, ahead), moving & has_front);
     steps -= moving;
   }
-  intv open = asked & MARK(steps > 0);
+  intv open = asked & ~taken & MARK(steps > 0);
   while (any_lane(open)) {
     intv known = any_view_knows(around, depths, add_scaled(center, convert_floatv(steps + 1), forward), open);
     known |= any_view_knows(around, depths, add_scaled(center, convert_floatv(steps), forward), open & ~known);
@@ -62,13 +63,14 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
 }
 
 // One work item handles a chunk of LANES new surfels.
-//   in  slots, tables, bricks: of the seen points (common/seen_points.cl)
+//   in  seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //       created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
 //       views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this frame's among them
 //   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
 __kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
-                             __global const ushort* depths, __global const float* layer_depth, __global const int* slots,
-                             __global const int* tables, __global const int* bricks, __global const uchar* tile_seen,
+                             __global const ushort* depths, __global const float* layer_depth, __global const int* seen_slots,
+                             __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
+                             __global const int* taken_tables, __global const int* taken_bricks, __global const uchar* tile_seen,
                              __global const int* created, const int count, __global const int* voxels, __global const int* around,
                              __global const float* directions, __global uint4* new_surfels, __global int* new_cells) {
   const int chunk = get_global_id(0);
@@ -83,10 +85,11 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
     find_views_around(&f.grid, views, tile_views, view_groups, v, &near);
     normal = surfel_normals(&f.grid, &f.limits, &f.own_view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist,
                             &ragged);
-    const SeenPoints seen = {slots, tables, bricks};
+    const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
     bool ask_seen = false;
     for (int n = 0; n < near.tile_count; ++n) ask_seen = ask_seen || tile_seen[near.tiles[n]] != SEEN_NONE;
-    p = slide_to_boundary(&f, &near, &seen, f.has_seen && ask_seen, depths, v, center, normal, exist);
+    const intv is_taken = f.has_taken ? seen_before(&f, &taken, center, exist) : 0;
+    p = slide_to_boundary(&f, &near, &seen, f.has_seen && ask_seen, depths, v, center, normal, is_taken, exist);
   }
   const floatv radius = f.limits.create_radius * voxel_size(&f.grid, center.z);
   const uintv attributes = ragged ? (uintv)(SURFEL_RAGGED) : (uintv)(0);

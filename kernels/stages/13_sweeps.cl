@@ -2,8 +2,8 @@
 //
 // At each voxel, in this order: if it is invalid or an exit, e = 0; K' |= e; if it is an entry and not invalid, e = 1. Along i and j one
 // word carries 64 paths.
-//   in  events[3][EVENT_PLANES]: bit fields of 9_sign_field;  hull: of 10_known_hull: states in which paths enter the grid
-//       lines: of 8_needed_paths: other paths are not walked
+//   in  events[3][EVENT_PLANES]: bit fields of 11_sign_field;  hull: of 12_known_hull: states in which paths enter the grid
+//       lines: of 10_needed_paths: other paths are not walked
 //   i/o known: bit field K'
 
 INLINE bool is_needed(__global const uint* lines, int word) { return (lines[word] | lines[word + 1]) != 0; }

@@ -3,7 +3,7 @@
 // For a voxel at offset u (locally metric voxel coordinates) from a surfel with normal n, reach rho and thickness t:
 //   e^2 = (u.n)^2 / t^2 + |u - (u.n) n|^2 / rho^2,  weight w = 1 - e where e < 1;  g_tau = <n, t_tau>
 //   |g_tau| > th_d: D_tau += sign(g_tau) w;   else, where e < 1 and |u - (u.n) n| < rho / 2: the voxel is invalid for family tau.
-// Ours: a ragged surfel (15_creation) makes voxels invalid for every family.
+// Ours: a ragged surfel (17_creation) makes voxels invalid for every family.
 // One work-group handles one tile in local memory. Its sums are integers: the order of surfels and the number of work items do not matter.
 
 // Surfels as the view's grid sees them.
@@ -291,7 +291,7 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
 }
 
 // One work-group handles a tile. Tiles without a path to be walked are left as they are.
-//   in  lines: of 8_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
+//   in  lines: of 10_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
 //   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; they are right on the paths to be walked
 __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(const Frame f, __global const uint* lines,
                                                                                        __global const ViewSurfel* view_surfels,

@@ -1,11 +1,11 @@
-// Candidates: where new surfels may be created - paper 3.5, eq. (13): voxels that are not observed, beside observed ones. 3_visit takes
+// Candidates: where new surfels may be created - paper 3.5, eq. (13): voxels that are not observed, beside observed ones. 5_visit takes
 // those off that have a surfel. Whether others are known is asked of the kept views first, and of the surfels where those leave it open.
 
 // One work item handles the words of LANES columns: work item (j words_k + w) chunks + chunk has columns LANES chunk ... of row j, where
 // the grid's rows and columns are filled up to whole tiles of VIEW_TILE.
 //   in  observed: bit field C~, with SPARE_WORDS behind it
 //   out candidates: bit field by tiles, of all their columns; voxels with a surfel that stays are among them
-//       counts[COUNTS]: 0, for what 3_visit counts next
+//       counts[COUNTS]: 0, for what 5_visit counts next
 __kernel void find_candidates(const Frame f, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
   if (get_global_id(0) < COUNTS) counts[get_global_id(0)] = 0;
   const int chunks = chunks_of(VIEW_TILE * grid_tiles(f.grid.size_i)), i = LANES * (get_global_id(0) % chunks),

@@ -87,7 +87,7 @@ INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfe
 
 // One work item handles LANES surfels of a page: those beyond a face, and within its range in the other two coordinates (with their own
 // reach as a margin), enter it. Work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
-//   in  pages[count];  alive, page_block, surfels: the map;  lines: of 8_needed_paths
+//   in  pages[count];  alive, page_block, surfels: the map;  lines: of 10_needed_paths
 //   i/o faces: six images of keys, HULL_EMPTY before; they are right on the paths to be walked
 __kernel void project_hull(const Frame f, __global const uint* pages, const uint count, __global const ulong* alive,
                            __global const int4* page_block, __global const uint4* surfels, __global const uint* lines,

@@ -1,0 +1,219 @@
+// Evidence that a measured surface stands where space was known to be free - ours. Known space only grows by the paper's method, so the
+// deepest measurement of all would decide for ever, and a box that is put down would never appear.
+//
+// A pixel's surface has strong evidence if enough of the last frames measure it as well, and if enough kept views contradict it: they have
+// seen farther there, by a wide margin. Views older than the last frames are asked, the newest first, until some have had an opinion. A
+// surface that half as many of them agree with as contradict it is an old one, seen with errors. Seen points contradict a surface as well,
+// if they are seen all around it. Weak evidence needs smaller numbers and margins.
+//
+// Only where all pixels of a square have strong evidence is space taken back: at the edges of things that stand still, errors of poses
+// alone make surfaces lie in known space. From there it goes on to the pixels around that have weak evidence.
+
+// LANES pixels of the frame, and the points that they measure.
+typedef struct {
+  intv measured;        // marks of those that measure a surface
+  Points p;             // camera frame [m]
+  floatv voxel, noise;  // voxel_size there; three standard deviations of a depth and a step [m]
+} MeasuredPoints;
+
+//   s, t: columns and rows
+INLINE MeasuredPoints points_of_pixels(const Grid* g, const TakeBackLimits* limits, __global const float* depth, intv s, intv t) {
+  MeasuredPoints m;
+  const intv inside = MARK((s < g->width) & (t < g->height));
+  const floatv d = gather_float(depth, inside ? t * g->width + s : 0);
+  m.measured = inside & MARK(d > 0.0f);
+  m.p.x = (convert_floatv(s + g->padding_i) - g->center_i) * d / g->fx;
+  m.p.y = (convert_floatv(t + g->padding_j) - g->center_j) * d / g->fy;
+  m.p.z = d;
+  m.voxel = voxel_size(g, d);
+  m.noise = 3.0f * (limits->noise + limits->noise_growth * d * d) + limits->quantisation * d * d;
+  return m;
+}
+
+// Pixels of a view that points lie in, if the view has all 8 pixels around them.
+//   out q: the points in the view;  s, t: columns and rows
+INLINE intv pixels_in_view(const View* view, Points p, intv asked, Points* q, intv* s, intv* t) {
+  *q = transformed(&view->to_image, p);
+  const floatv scale = 1.0f / q->z, x = q->x * scale, y = q->y * scale;
+  const intv inside =
+      asked & MARK((q->z > 0.0f) & (x >= 1.0f) & (y >= 1.0f) & (x < (float)(view->width - 1)) & (y < (float)(view->height - 1)));
+  *s = inside ? convert_intv(x) : 1;
+  *t = inside ? convert_intv(y) : 1;
+  return inside;
+}
+
+// Does one of the last frames measure a surface at the points, within `margin` [m] of what its 3 x 3 pixels there measure?
+//   images: of the last frames, [height][width] each from first_pixel on
+INLINE intv frame_supports(const View* view, __global const float* images, Points p, floatv margin, intv asked) {
+  Points q;
+  intv s, t;
+  const intv inside = pixels_in_view(view, p, asked, &q, &s, &t);
+  if (!any_lane(inside)) return 0;
+  floatv nearest = INFINITY, farthest = 0.0f;
+  for (int n = 0; n < 9; ++n) {
+    const floatv d = gather_float(images + view->first_pixel, (t + n / 3 - 1) * view->width + s + n % 3 - 1);
+    nearest = fmin(nearest, d > 0.0f ? d : (floatv)(INFINITY));
+    farthest = fmax(farthest, d);
+  }
+  return inside & MARK((q.z >= nearest - margin) & (q.z <= farthest + margin));
+}
+
+INLINE floatv depths_at(const View* view, __global const ushort* depths, intv s, intv t) {
+  const uintv pixel = view->first_pixel + view_pixels((uint)view->width, as_uintv(s), as_uintv(t));
+  return view_depths(depths, as_intv(pixel), view->depth_step);
+}
+
+// How much farther than points a kept view has seen there [m]: its pixel there, and all 3 x 3 pixels around it if it sees farther by
+// `margin`. -INFINITY where it has not looked, or where that is not clear.
+INLINE floatv seen_farther(const View* view, __global const ushort* depths, Points p, floatv margin, intv asked) {
+  Points q;
+  intv s, t;
+  const intv inside = pixels_in_view(view, p, asked, &q, &s, &t);
+  if (!any_lane(inside)) return -INFINITY;
+  const floatv middle = depths_at(view, depths, s, t);
+  const intv looked = inside & MARK(middle > 0.0f), farther = looked & MARK(middle > q.z + margin);
+  if (!any_lane(farther)) return looked ? middle - q.z : (floatv)(-INFINITY);
+  floatv smallest = middle;
+  for (int n = 0; n < 9; ++n)
+    if (n != 4) smallest = fmin(smallest, depths_at(view, depths, s + n % 3 - 1, t + n / 3 - 1));
+  const intv unclear = farther & MARK(smallest <= q.z + margin), known = looked & ~unclear;
+  return known ? (farther ? smallest : middle) - q.z : (floatv)(-INFINITY);
+}
+
+// Was the space around points seen before, by `margin` [m]: behind them, and beside them along the image's axes?
+INLINE intv deep_in_seen_space(const Frame* f, const SeenPoints* seen, Points p, floatv margin, intv asked) {
+  intv deep = seen_before(f, seen, p, asked);
+  if (any_lane(deep)) deep = seen_before(f, seen, scaled(1.0f + margin / lengths(p), p), deep);
+  for (int n = 0; n < 4 && any_lane(deep); ++n) {
+    const floatv step = n % 2 == 0 ? margin : -margin;
+    const Points beside = {p.x + (n < 2 ? step : 0.0f), p.y + (n < 2 ? 0.0f : step), p.z};
+    deep = seen_before(f, seen, beside, deep);
+  }
+  return deep;
+}
+
+// What the kernels ask: the last frames, older kept views, seen points and taken points.
+typedef struct {
+  __global const View* last_frames;
+  __global const float* images;
+  __global const View* views;
+  __global const ushort* depths;
+  SeenPoints seen, taken;
+  int frame_count, view_count;
+} Witnesses;
+
+// The evidence of LANES pixels.
+INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m) {
+  intv supports = 0;
+  const floatv margin = limits->support_margin * m->voxel + m->noise;
+  for (int n = 0; n < w->frame_count; ++n) {
+    const View view = w->last_frames[n];
+    supports -= frame_supports(&view, w->images, m->p, margin, m->measured);
+  }
+  intv open = m->measured & MARK(supports >= limits->weak_supports);
+  const floatv strong_margin = fmax(limits->strong_margin * m->voxel, m->noise),
+               weak_margin = fmax(limits->weak_margin * m->voxel, m->noise);
+  // What was taken back already need not be taken back again.
+  if (f->has_taken) open &= ~seen_before(f, &w->taken, scaled(1.0f + 0.5f * limits->reach * m->voxel / lengths(m->p), m->p), open);
+
+  intv strong = 0, weak = 0, agree = 0;  // numbers of opinions: of weak contradictions, strong ones among them, and of views that agree
+  for (int n = 0; n < w->view_count; ++n) {
+    const intv asked = open & MARK(weak + agree < limits->opinions);
+    if (!any_lane(asked)) break;
+    const View view = w->views[n];
+    const floatv farther = seen_farther(&view, w->depths, m->p, weak_margin, asked);
+    agree -= MARK(fabs(farther) <= margin);
+    weak -= MARK(farther > weak_margin);
+    strong -= MARK(farther > strong_margin);
+  }
+  if (f->has_seen) {
+    const intv by_seen = deep_in_seen_space(f, &w->seen, m->p, weak_margin, open);
+    weak = by_seen ? max(weak, limits->contradictions) : weak;
+    strong = deep_in_seen_space(f, &w->seen, m->p, strong_margin, by_seen) ? max(strong, limits->contradictions) : strong;
+  }
+  const intv is_weak = open & MARK((weak >= limits->contradictions) & (weak >= 2 * agree)),
+             is_strong = is_weak & MARK((strong >= limits->contradictions) & (supports >= limits->strong_supports));
+  return is_strong ? STRONG_EVIDENCE : is_weak ? WEAK_EVIDENCE : NO_EVIDENCE;
+}
+
+INLINE int coarse_size(int pixels) { return (pixels + TAKE_SQUARE - 1) / TAKE_SQUARE; }
+
+INLINE void store_bytes(intv values, int count, __global uchar* to) {
+  int some[LANES];
+  vstorev(values, 0, some);
+  for (int n = 0; n < min(count, LANES); ++n) to[n] = (uchar)some[n];
+}
+
+// Evidence at every TAKE_SQUARE-th column and row: every square has one of these pixels. One work item handles LANES of them.
+//   in  depth[height][width] [m]: of this frame;  last_frames[frame_count], images;  views[view_count], depths: as in Witnesses
+//       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
+//   out coarse[coarse rows][coarse columns]: evidence;  count: the number of pixels with strong evidence is added to it
+__kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
+                             const int frame_count, __global const float* images, __global const View* views, const int view_count,
+                             __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
+                             __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
+                             __global const int* taken_bricks, __global uchar* coarse, __global uint* count) {
+  const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height), first = LANES * (int)get_global_id(0);
+  if (first >= pixels) return;
+  const Witnesses w = {
+      last_frames, images,    views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
+      frame_count, view_count};
+  const intv n = first + lane_numbers(), row = quotients(n, columns);
+  const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, TAKE_SQUARE * (n - row * columns), TAKE_SQUARE * row);
+  const intv evidence = evidence_of(&f, &limits, &w, &m);
+  store_bytes(evidence, pixels - first, coarse + first);
+  const uint strong = lane_bits(MARK(evidence == STRONG_EVIDENCE));
+  if (strong != 0) atomic_add(count, (uint)popcount(strong));
+}
+
+// Evidence of all pixels that may belong to a square with strong evidence, or be near enough to one; none of the others. One work item
+// handles LANES pixels of a row; work item n starts at pixel LANES n of rows that are filled up to whole chunks.
+//   in  as weigh_coarsely;  coarse: of it
+//   out evidence[height][width]
+__kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
+                             const int frame_count, __global const float* images, __global const View* views, const int view_count,
+                             __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
+                             __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
+                             __global const int* taken_bricks, __global const uchar* coarse, __global uchar* evidence) {
+  const int chunks = chunks_of(f.grid.width), t = get_global_id(0) / chunks, first = LANES * (get_global_id(0) % chunks);
+  if (t >= f.grid.height) return;
+  const int columns = coarse_size(f.grid.width), rows = coarse_size(f.grid.height), reach = TAKE_SQUARE / 2 + TAKE_GROWTH;
+  bool near = false;
+  for (int row = max(t - reach, 0) / TAKE_SQUARE; row <= min((t + reach) / TAKE_SQUARE, rows - 1); ++row)
+    for (int column = max(first - reach, 0) / TAKE_SQUARE; column <= min((first + LANES - 1 + reach) / TAKE_SQUARE, columns - 1); ++column)
+      near = near || coarse[row * columns + column] == STRONG_EVIDENCE;
+  intv found = NO_EVIDENCE;
+  if (near) {
+    const Witnesses w = {
+        last_frames, images,    views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
+        frame_count, view_count};
+    const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, first + lane_numbers(), (intv)(t));
+    found = evidence_of(&f, &limits, &w, &m);
+  }
+  store_bytes(found, f.grid.width - first, evidence + t * f.grid.width + first);
+}
+
+// Middles of squares of TAKE_SQUARE x TAKE_SQUARE pixels that all have strong evidence. One work item handles a pixel.
+//   out squares[height][width]: 1 or 0
+__kernel void find_squares(const Frame f, __global const uchar* evidence, __global uchar* squares) {
+  const int n = get_global_id(0), s = n % f.grid.width, t = n / f.grid.width, half_side = TAKE_SQUARE / 2;
+  if (t >= f.grid.height) return;
+  bool strong =
+      s >= half_side && t >= half_side && s + half_side < f.grid.width && t + half_side < f.grid.height && evidence[n] == STRONG_EVIDENCE;
+  for (int m = 0; strong && m < TAKE_SQUARE * TAKE_SQUARE; ++m)
+    strong = evidence[n + (m / TAKE_SQUARE - half_side) * f.grid.width + m % TAKE_SQUARE - half_side] == STRONG_EVIDENCE;
+  squares[n] = strong ? 1 : 0;
+}
+
+// Pixels whose surface takes space back: those with evidence that are near the middle of a square. One work item handles a pixel.
+//   out chosen[height][width]: 1 or 0
+__kernel void choose_pixels(const Frame f, __global const uchar* evidence, __global const uchar* squares, __global uchar* chosen) {
+  const int n = get_global_id(0), s = n % f.grid.width, t = n / f.grid.width;
+  if (t >= f.grid.height) return;
+  bool near = false;
+  if (evidence[n] != NO_EVIDENCE)
+    for (int v = max(t - TAKE_GROWTH, 0); v <= min(t + TAKE_GROWTH, f.grid.height - 1); ++v)
+      for (int u = max(s - TAKE_GROWTH, 0); u <= min(s + TAKE_GROWTH, f.grid.width - 1); ++u)
+        near = near || squares[v * f.grid.width + u] != 0;
+  chosen[n] = near ? 1 : 0;
+}

@@ -1,0 +1,106 @@
+/// The inside of a Mapper: its memory, and the stages of a frame in the order in which they run.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/checked.hpp"
+#include "frame/camera.hpp"
+#include "frame/limits.hpp"
+#include "frame/recent_views.hpp"
+#include "frontier_surfels/mapper.hpp"
+#include "map/change_readers.hpp"
+#include "map/seen_points.hpp"
+#include "map/surfel_map.hpp"
+#include "opencl/commands.hpp"
+#include "stages/candidates.hpp"
+#include "stages/creation.hpp"
+#include "stages/known_space.hpp"
+#include "stages/observed_space.hpp"
+#include "stages/remembering.hpp"
+#include "stages/surfel_split.hpp"
+#include "stages/surfel_visit.hpp"
+#include "stages/taking_back.hpp"
+#include "stages/view_settling.hpp"
+#include "storage/map_archive.hpp"
+
+namespace frontier_surfels {
+
+struct Mapper::Impl {
+  explicit Impl(const Config& wanted)
+      : config(checked(wanted)),
+        limits(make_limits(config)),
+        commands(choose_device(config)),
+        lists(commands),
+        map(commands, lists, config),
+        seen(commands, map.block_size()),
+        views(commands, config),
+        cameras(commands, config),
+        observed(commands),
+        taking_back(commands, config, map.block_size()),
+        candidates(commands),
+        visit(commands),
+        splitting(commands, lists),
+        settling(commands),
+        list(commands, lists),
+        creation(commands, lists),
+        remembering(commands) {
+    if (config.map_folder.empty()) return;
+    archive = std::make_unique<MapArchive>(config, map, seen, views,
+                                           [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
+    views.clear(archive->empty());
+    if (!config.seen_points) return;  // the folder's views are of no use then, and stay there
+    const std::vector<SavedView> stored = archive->stored_views(&warnings);
+    views.make_room(stored);
+    load_views(stored);
+    archive->store_views();
+  }
+
+  void begin_call();
+  void remember_forgotten();
+  Report integrate(const DepthFrame& input);
+  Report update(const DepthFrame& input);
+  Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
+  SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
+  void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
+  void finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, const Camera& camera,
+                    Report& report);
+  Changes changes(std::uint64_t since);
+  SavedMap saved_map();
+  void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
+  void load_views(const std::vector<SavedView>& saved);
+  std::size_t device_bytes() const { return commands.allocated_bytes() - map.untouched_bytes(); }
+
+  const Config config;
+  const Limits limits;
+  Commands commands;
+  Lists lists;
+  SurfelMap map;
+  SeenPoints seen;
+  RecentViews views;
+  Cameras cameras;
+
+  // The stages, in the order in which they run
+  ObservedSpace observed;
+  TakingBack taking_back;
+  Candidates candidates;
+  SurfelVisit visit;
+  SurfelSplit splitting;
+  ViewSettling settling;
+  CandidateList list;
+  std::optional<KnownSpace> known_space;  ///< made by the first frame that needs it
+  Creation creation;
+  Remembering remembering;
+
+  std::unique_ptr<MapArchive> archive;  ///< with a map_folder
+  std::vector<std::string> warnings;    ///< that have not been taken
+  ChangeReaders readers;
+  std::uint64_t sequence = 0;
+  std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
+  bool pages_changed = false;         ///< by the archive, since the last frame
+};
+
+}  // namespace frontier_surfels

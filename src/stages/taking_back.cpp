@@ -1,0 +1,206 @@
+#include "stages/taking_back.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace frontier_surfels {
+namespace {
+
+constexpr const char* kStage = "taking_back";
+
+std::size_t pixels_of(const Grid& g) { return static_cast<std::size_t>(g.width) * g.height; }
+
+}  // namespace
+
+TakeBackLimits make_take_back_limits(const Config& config) {
+  TakeBackLimits limits = {};
+  limits.noise = static_cast<float>(config.noise);
+  limits.noise_growth = static_cast<float>(config.noise_growth);
+  limits.quantisation = static_cast<float>(config.quantisation);
+  limits.support_margin = 2;
+  limits.weak_margin = 3;
+  limits.strong_margin = 6;
+  limits.reach = 16;
+  limits.weak_supports = 3;
+  limits.strong_supports = 5;
+  limits.contradictions = 3;
+  limits.opinions = 8;
+  return limits;
+}
+
+TakingBack::TakingBack(Commands& commands, const Config& config, double block_size)
+    : commands_(commands),
+      limits_(make_take_back_limits(config)),
+      is_on_(config.take_back && config.seen_points),
+      taken_(commands, block_size),
+      images_(commands),
+      frame_views_(commands),
+      older_views_(commands),
+      taken_by_(commands),
+      coarse_(commands),
+      evidence_(commands),
+      squares_(commands),
+      chosen_(commands),
+      states_(commands),
+      strong_count_(commands) {}
+
+void TakingBack::clear() {
+  last_frames_.clear();
+  taken_.clear();
+}
+
+void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
+  if (!is_on_) return;
+  taken_.choose_spacing(seen.spacing());
+  taken_.open_window(window);
+}
+
+std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
+                               const SeenPoints& seen, Frame* frame) {
+  if (!is_on_) return 0;
+  frame->has_taken = taken_.empty() ? 0 : 1;
+  std::vector<cl_uchar> chosen;
+  if (find_evidence(*frame, camera, views, seen)) chosen = choose_pixels(*frame, camera, views, seen);
+  const auto count = static_cast<std::size_t>(std::count(chosen.begin(), chosen.end(), 1));
+  const std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
+  frame->has_taken = 0;
+  if (bricks.empty()) return 0;
+  change_bricks(*frame, camera, views, window, count > 0, bricks);
+  taken_.open_window(window);
+  for (const Brick& b : bricks)
+    if (taken_.entry(b.table, b.brick) != SEEN_BRICK_EMPTY) frame->has_taken = 1;
+  return count;
+}
+
+/// @return whether any of the coarse pixels has strong evidence
+bool TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
+  if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return false;
+  std::vector<View> last, older = views.views_before(LAST_FRAMES);
+  for (const LastFrame& other : last_frames_) {
+    last.push_back(views.view_from_current(other.intrinsics, other.T_world_camera));
+    last.back().first_pixel = static_cast<std::uint32_t>(other.room * room_size_);
+  }
+  frame_views_.send(std::move(last));
+  older_count_ = static_cast<cl_int>(older.size());
+  older_views_.send(std::move(older));
+
+  const auto across = [](int pixels) { return static_cast<std::size_t>((pixels + TAKE_SQUARE - 1) / TAKE_SQUARE); };
+  const std::size_t coarse = across(frame.grid.width) * across(frame.grid.height);
+  coarse_.resize(coarse);
+  strong_count_.resize(1);
+  strong_count_.fill(kStage, 0, 1);
+  weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_(), strong_count_());
+  return strong_count_.read_one(0) > 0;
+}
+
+void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
+                       const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to) {
+  commands_.run(kStage, kernel, items, commands_.device().heavy_group(), frame, limits_, camera.depth()(), frame_views_(),
+                static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(), seen.slots(),
+                seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), from, to);
+}
+
+/// @return [height][width]: 1 for pixels whose surface takes space back
+std::vector<cl_uchar> TakingBack::choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views,
+                                                const SeenPoints& seen) {
+  const std::size_t pixels = pixels_of(frame.grid), rows = frame.grid.height;
+  for (DeviceArray<cl_uchar>* image : {&evidence_, &squares_, &chosen_}) image->resize(pixels);
+  weigh("weigh_evidence", commands_.chunks(frame.grid.width) * rows, frame, camera, views, seen, coarse_(), evidence_());
+  commands_.run(kStage, "find_squares", pixels, kGroup, frame, evidence_(), squares_());
+  commands_.run(kStage, "choose_pixels", pixels, kGroup, frame, evidence_(), squares_(), chosen_());
+  return chosen_.read(pixels);
+}
+
+/// The bricks of the window that have taken points already, and those that may get some behind chosen pixels.
+std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
+                                                            const std::vector<cl_uchar>& chosen) {
+  const Grid& g = frame.grid;
+  const Eigen::Isometry3d T_local_camera = window.T_camera_local().inverse();
+  const double brick_size = SEEN_BRICK * taken_.spacing();
+  std::set<std::tuple<int, int, int>> behind;  // x, y, z, counted in bricks from the window's corner
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    if (chosen[n] == 0) continue;
+    const double s = static_cast<double>(n % g.width) - image.intrinsics.cx, t = static_cast<double>(n / g.width) - image.intrinsics.cy;
+    const double near = image.depth[n], far = near + limits_.reach * std::max(near, static_cast<double>(g.z_min)) / g.f;
+    Eigen::AlignedBox3d box;  // around the part of the pixel's pyramid
+    for (const double z : {near, far})
+      for (const double x : {s - 0.5, s + 0.5})
+        for (const double y : {t - 0.5, t + 0.5})
+          box.extend(T_local_camera * Eigen::Vector3d(x / image.intrinsics.fx * z, y / image.intrinsics.fy * z, z));
+    const Eigen::Array3i first = (box.min() / brick_size).array().floor().cast<int>(),
+                         last = (box.max() / brick_size).array().floor().cast<int>();
+    for (int z = first.z(); z <= last.z(); ++z)
+      for (int y = first.y(); y <= last.y(); ++y)
+        for (int x = first.x(); x <= last.x(); ++x) behind.emplace(x, y, z);
+  }
+
+  const int shift = taken_.shift(), sides = 1 << shift;
+  const Window& w = window.window();
+  const auto place_of = [&](int cell, int brick) {
+    return Eigen::Array3i(cell % w.size_x * sides + brick % sides, cell / w.size_x % w.size_y * sides + brick / sides % sides,
+                          cell / w.size_x / w.size_y * sides + brick / sides / sides);
+  };
+  std::vector<Brick> bricks;
+  for (int cell = 0; cell < window.cells(); ++cell) {
+    if (!taken_.has_table(window.block(cell))) continue;
+    const int table = taken_.table(window.block(cell));
+    for (int brick = 0; brick < taken_.bricks_of_block(); ++brick) {
+      const Eigen::Array3i at = place_of(cell, brick);
+      if (taken_.entry(table, brick) == SEEN_BRICK_EMPTY) continue;
+      behind.erase({at.x(), at.y(), at.z()});
+      bricks.push_back({table, brick, {{at.x(), at.y(), at.z(), 0}}});
+    }
+  }
+  for (const auto& [x, y, z] : behind) {
+    if (x < 0 || y < 0 || z < 0 || x >= w.size_x << shift || y >= w.size_y << shift || z >= w.size_z << shift) continue;
+    const int cell = ((z >> shift) * w.size_y + (y >> shift)) * w.size_x + (x >> shift);
+    const int brick = ((z & (sides - 1)) << 2 * shift) | ((y & (sides - 1)) << shift) | (x & (sides - 1));
+    bricks.push_back({taken_.table(window.block(cell)), brick, {{x, y, z, 0}}});
+  }
+  return bricks;
+}
+
+/// Sets and clears the points of bricks, which get words of their own for that.
+void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
+                               const std::vector<Brick>& bricks) {
+  std::vector<cl_int4> taken_by;
+  for (const Brick& b : bricks) {
+    taken_by.push_back(b.place);
+    taken_by.back().s[3] = taken_.own_brick(b.table, b.brick);
+  }
+  taken_.send_entries(kStage);
+  const auto count = static_cast<cl_int>(bricks.size());
+  const std::size_t cubes = bricks.size() * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8);
+  taken_by_.send(std::move(taken_by));
+  states_.resize(bricks.size());
+  const cl::Buffer& chosen = has_chosen ? chosen_() : camera.depth()();  // a kernel takes no missing buffer
+  commands_.run(kStage, "take_points", cubes, commands_.device().heavy_group(), frame, limits_,
+                views.own_view_from(window.T_camera_local()), views.depths(), camera.depth()(), static_cast<cl_int>(has_chosen), chosen,
+                taken_by_(), count, taken_.brick_words());
+  commands_.run(kStage, "find_brick_states", count, kGroup, taken_by_(), count, taken_.brick_words(), states_());
+  const std::vector<cl_uchar> states = states_.read(bricks.size());
+  for (std::size_t n = 0; n < bricks.size(); ++n)
+    if (states[n] != SEEN_MIXED) taken_.set_uniform(bricks[n].table, bricks[n].brick, states[n] == SEEN_ALL);
+}
+
+void TakingBack::add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
+  if (!is_on_) return;
+  const std::size_t pixels = image.depth.size();
+  if (pixels > room_size_) {
+    last_frames_.clear();
+    images_.allocate(LAST_FRAMES * pixels);
+    room_size_ = pixels;
+  }
+  std::size_t room = last_frames_.size();
+  if (room == LAST_FRAMES) {
+    room = last_frames_.back().room;
+    last_frames_.pop_back();
+  }
+  commands_.queue().enqueueCopyBuffer(camera.depth()(), images_(), 0, room * room_size_ * sizeof(float), pixels * sizeof(float));
+  last_frames_.push_front({image.intrinsics, T_world_camera, room});
+}
+
+}  // namespace frontier_surfels

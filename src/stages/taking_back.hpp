@@ -1,0 +1,86 @@
+/// Taking back - ours: a surface that stands in known space makes the space behind it unknown again; kernels/stages/2_evidence.cl and
+/// 3_taking_back.cl.
+///
+/// The world has a lattice of taken points beside that of the seen points. What kept views and seen points know at them does not count
+/// until a frame sees them again. So no view has to be changed, and what a view knows beyond stays known.
+#pragma once
+
+#include <deque>
+
+#include "frame/recent_views.hpp"
+#include "frame/working_image.hpp"
+#include "frontier_surfels/config.hpp"
+#include "map/map_window.hpp"
+#include "map/seen_points.hpp"
+#include "stages/frame.hpp"
+
+namespace frontier_surfels {
+
+TakeBackLimits make_take_back_limits(const Config& config);
+
+class TakingBack {
+ public:
+  TakingBack(Commands& commands, const Config& config, double block_size);
+
+  /// Sends the tables of the window's blocks. The lattice becomes that of the seen points.
+  void open_window(const MapWindow& window, const SeenPoints& seen);
+
+  /// Takes space back behind the surfaces of this frame that the last frames support and that known space contradicts, and gives back what
+  /// this frame sees. After that frame->has_taken says whether any point of the window is taken.
+  /// @param seen  seen points; open_window() must have been called for both lattices
+  /// @return number of pixels whose surface took space back
+  std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
+                     const SeenPoints& seen, Frame* frame);
+
+  /// Lets later frames ask whether this one supports their surfaces.
+  void add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
+
+  /// Forgets all frames and all taken points.
+  void clear();
+
+  SeenPoints& taken() { return taken_; }
+  const SeenPoints& taken() const { return taken_; }
+
+  /// @name Of the last update() that found strong evidence at all, [height][width] of the working image
+  /// @{
+  const DeviceArray<cl_uchar>& evidence() const { return evidence_; }  ///< NO_EVIDENCE, WEAK_EVIDENCE or STRONG_EVIDENCE
+  const DeviceArray<cl_uchar>& chosen() const {
+    return chosen_;
+  }  ///< 1: the pixel's surface took space back
+     /// @}
+
+ private:
+  struct LastFrame {
+    Intrinsics intrinsics;
+    Eigen::Isometry3d T_world_camera;
+    std::size_t room = 0;  ///< of images_
+  };
+  struct Brick {
+    int table, brick;
+    cl_int4 place;  ///< x, y, z, counted in bricks from the window's corner, and its number
+  };
+
+  bool find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
+  std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
+  std::vector<Brick> bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
+                                      const std::vector<cl_uchar>& chosen);
+  void change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
+                     const std::vector<Brick>& bricks);
+  void weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
+             const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to);
+
+  Commands& commands_;
+  const TakeBackLimits limits_;
+  const bool is_on_;
+  SeenPoints taken_;
+  std::deque<LastFrame> last_frames_;  ///< newest first, at most LAST_FRAMES
+  std::size_t room_size_ = 0;          ///< [pixel]
+  DeviceArray<float> images_;          ///< [LAST_FRAMES][room_size_]: depths of the last frames
+  SentArray<View> frame_views_, older_views_;
+  cl_int older_count_ = 0;
+  SentArray<cl_int4> taken_by_;
+  DeviceArray<cl_uchar> coarse_, evidence_, squares_, chosen_, states_;
+  DeviceArray<cl_uint> strong_count_;
+};
+
+}  // namespace frontier_surfels
