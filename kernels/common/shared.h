@@ -252,7 +252,8 @@ typedef struct {
   float weak_margin, strong_margin;           // a view contradicts a surface if it sees farther by this [voxel]
   float reach;                                // so far behind a surface space is taken back [voxel]
   SHARED_INT weak_supports, strong_supports;  // of the last frames
-  SHARED_INT contradictions, opinions;        // kept views that must contradict a surface, and those that may have an opinion
+  SHARED_INT contradictions;                  // so many kept views must contradict a surface
+  SHARED_INT opinions, newer_opinions;        // that count from the newest contradiction on, and of views that agree before it
 } TakeBackLimits;
 
 // What every stage of a frame is told.
@@ -274,7 +275,7 @@ static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");
 static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 14 * 4, "Limits must have no padding");
-static_assert(sizeof(TakeBackLimits) == 11 * 4, "TakeBackLimits must have no padding");
+static_assert(sizeof(TakeBackLimits) == 12 * 4, "TakeBackLimits must have no padding");
 static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 4) * 4, "Frame must have no padding");
 }  // namespace frontier_surfels
 #endif

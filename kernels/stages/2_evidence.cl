@@ -2,9 +2,10 @@
 // deepest measurement of all would decide for ever, and a box that is put down would never appear.
 //
 // A pixel's surface has strong evidence if enough of the last frames measure it as well, and if enough kept views contradict it: they have
-// seen farther there, by a wide margin. Views older than the last frames are asked, the newest first, until some have had an opinion. A
-// surface that half as many of them agree with as contradict it is an old one, seen with errors. Seen points contradict a surface as well,
-// if they are seen all around it. Weak evidence needs smaller numbers and margins.
+// seen farther there, by a wide margin. Views older than the last frames are asked, the newest first. From the newest contradiction on some
+// opinions count: a surface with which half as many views agree as contradict it is an old one, seen with errors. Views that agree and are
+// newer have seen the same thing already. Seen points contradict a surface as well, if they are seen all around it. Weak evidence needs
+// smaller numbers and margins.
 //
 // Only where all pixels of a square have strong evidence is space taken back: at the edges of things that stand still, errors of poses
 // alone make surfaces lie in known space. From there it goes on to the pixels around that have weak evidence.
@@ -116,13 +117,17 @@ INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witn
   // What was taken back already need not be taken back again.
   if (f->has_taken) open &= ~seen_before(f, &w->taken, scaled(1.0f + 0.5f * limits->reach * m->voxel / lengths(m->p), m->p), open);
 
-  intv strong = 0, weak = 0, agree = 0;  // numbers of opinions: of weak contradictions, strong ones among them, and of views that agree
+  // Numbers of opinions: of weak contradictions, strong ones among them, views that agree but are older than the newest contradiction, and
+  // newer ones, which may have seen the same thing.
+  intv strong = 0, weak = 0, agree = 0, newer = 0;
   for (int n = 0; n < w->view_count; ++n) {
-    const intv asked = open & MARK(weak + agree < limits->opinions);
+    const intv asked = open & MARK((weak + agree < limits->opinions) & (newer < limits->newer_opinions));
     if (!any_lane(asked)) break;
     const View view = w->views[n];
     const floatv farther = seen_farther(&view, w->depths, m->p, weak_margin, asked);
-    agree -= MARK(fabs(farther) <= margin);
+    const intv agrees = MARK(fabs(farther) <= margin), first = MARK(weak == 0);
+    newer -= agrees & first;
+    agree -= agrees & ~first;
     weak -= MARK(farther > weak_margin);
     strong -= MARK(farther > strong_margin);
   }

@@ -28,6 +28,7 @@ TakeBackLimits make_take_back_limits(const Config& config) {
   limits.strong_supports = 5;
   limits.contradictions = 3;
   limits.opinions = 8;
+  limits.newer_opinions = 40;
   return limits;
 }
 
