@@ -251,7 +251,7 @@ typedef struct {
   float support_margin;                       // another frame supports a surface that it measures within this of it [voxel]
   float weak_margin, strong_margin;           // a view contradicts a surface if it sees farther by this [voxel]
   float reach;                                // so far behind a surface space is taken back [voxel]
-  SHARED_INT weak_supports, strong_supports;  // of the last frames
+  SHARED_INT weak_supports, strong_supports;  // of the last frames; of LAST_FRAMES that look there
   SHARED_INT contradictions;                  // so many kept views must contradict a surface
   SHARED_INT opinions, newer_opinions;        // that count from the newest contradiction on, and of views that agree before it
 } TakeBackLimits;

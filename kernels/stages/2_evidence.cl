@@ -1,11 +1,11 @@
 // Evidence that a measured surface stands where space was known to be free - ours. Known space only grows by the paper's method, so the
 // deepest measurement of all would decide for ever, and a box that is put down would never appear.
 //
-// A pixel's surface has strong evidence if enough of the last frames measure it as well, and if enough kept views contradict it: they have
-// seen farther there, by a wide margin. Views older than the last frames are asked, the newest first. From the newest contradiction on some
-// opinions count: a surface with which half as many views agree as contradict it is an old one, seen with errors. Views that agree and are
-// newer have seen the same thing already. Seen points contradict a surface as well, if they are seen all around it. Weak evidence needs
-// smaller numbers and margins.
+// A pixel's surface has strong evidence if most of the last frames that look there measure it as well, and if enough kept views contradict
+// it: they have seen farther there, by a wide margin. Views older than the last frames are asked, the newest first. From the newest
+// contradiction on some opinions count: a surface with which more than half as many views agree as contradict it is an old one, seen with
+// errors. Views that agree and are newer have seen the same thing already. Seen points contradict a surface as well, if they are seen all
+// around it. Weak evidence needs smaller numbers and margins.
 //
 // Only where all pixels of a square have strong evidence is space taken back: at the edges of things that stand still, errors of poses
 // alone make surfaces lie in known space. From there it goes on to the pixels around that have weak evidence.
@@ -44,12 +44,13 @@ INLINE intv pixels_in_view(const View* view, Points p, intv asked, Points* q, in
 }
 
 // Does one of the last frames measure a surface at the points, within `margin` [m] of what its 3 x 3 pixels there measure?
-//   images: of the last frames, [height][width] each from first_pixel on
-INLINE intv frame_supports(const View* view, __global const float* images, Points p, floatv margin, intv asked) {
+//   images: of the last frames, [height][width] each from first_pixel on;   i/o looked: minus the number of frames that look there
+INLINE intv frame_supports(const View* view, __global const float* images, Points p, floatv margin, intv asked, intv* looked) {
   Points q;
   intv s, t;
   const intv inside = pixels_in_view(view, p, asked, &q, &s, &t);
   if (!any_lane(inside)) return 0;
+  *looked += inside;
   floatv nearest = INFINITY, farthest = 0.0f;
   for (int n = 0; n < 9; ++n) {
     const floatv d = gather_float(images + view->first_pixel, (t + n / 3 - 1) * view->width + s + n % 3 - 1);
@@ -105,11 +106,11 @@ typedef struct {
 
 // The evidence of LANES pixels.
 INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m) {
-  intv supports = 0;
+  intv supports = 0, looked = 0;
   const floatv margin = limits->support_margin * m->voxel + m->noise;
   for (int n = 0; n < w->frame_count; ++n) {
     const View view = w->last_frames[n];
-    supports -= frame_supports(&view, w->images, m->p, margin, m->measured);
+    supports -= frame_supports(&view, w->images, m->p, margin, m->measured, &looked);
   }
   intv open = m->measured & MARK(supports >= limits->weak_supports);
   const floatv strong_margin = fmax(limits->strong_margin * m->voxel, m->noise),
@@ -125,19 +126,19 @@ INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witn
     if (!any_lane(asked)) break;
     const View view = w->views[n];
     const floatv farther = seen_farther(&view, w->depths, m->p, weak_margin, asked);
-    const intv agrees = MARK(fabs(farther) <= margin), first = MARK(weak == 0);
+    const intv contradicts = MARK(farther > weak_margin), agrees = MARK(fabs(farther) <= margin) & ~contradicts, first = MARK(weak == 0);
     newer -= agrees & first;
     agree -= agrees & ~first;
-    weak -= MARK(farther > weak_margin);
+    weak -= contradicts;
     strong -= MARK(farther > strong_margin);
   }
   if (f->has_seen) {
-    const intv by_seen = deep_in_seen_space(f, &w->seen, m->p, weak_margin, open);
+    const intv by_seen = deep_in_seen_space(f, &w->seen, m->p, weak_margin, open & MARK(2 * (agree + newer) <= limits->contradictions));
     weak = by_seen ? max(weak, limits->contradictions) : weak;
     strong = deep_in_seen_space(f, &w->seen, m->p, strong_margin, by_seen) ? max(strong, limits->contradictions) : strong;
   }
   const intv is_weak = open & MARK((weak >= limits->contradictions) & (weak >= 2 * agree)),
-             is_strong = is_weak & MARK((strong >= limits->contradictions) & (supports >= limits->strong_supports));
+             is_strong = is_weak & MARK((strong >= limits->contradictions) & (LAST_FRAMES * supports >= -limits->strong_supports * looked));
   return is_strong ? STRONG_EVIDENCE : is_weak ? WEAK_EVIDENCE : NO_EVIDENCE;
 }
 

@@ -106,10 +106,16 @@ Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry
   map.open_window(camera.grid(), T_world_camera);
   camera.set_image(image);
   views.set_current(image, T_world_camera);
-  seen.choose_spacing(config.seen_spacing > 0 ? config.seen_spacing : default_seen_spacing(camera.grid()));
+  seen.choose_spacing(seen_spacing(camera));
   seen.open_window(map.window());
   taking_back.open_window(map.window(), seen);
   return make_frame(camera, map.window(), views, config.seen_points ? &seen : nullptr, limits);
+}
+
+/// The wanted distance of the lattices' points. Both have the same, also before any view has been forgotten.
+double Mapper::Impl::seen_spacing(const Camera& camera) const {
+  if (!taking_back.taken().empty()) return taking_back.taken().spacing();
+  return config.seen_spacing > 0 ? config.seen_spacing : default_seen_spacing(camera.grid());
 }
 
 /// Finds the candidates, and then visits the surfels, which clears the candidates in their voxels.

@@ -56,6 +56,10 @@ void TakingBack::clear() {
 void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
   if (!is_on_) return;
   taken_.choose_spacing(seen.spacing());
+  if (taken_.shift() != seen.shift()) {  // points of another lattice are of no use
+    taken_.clear();
+    taken_.choose_spacing(seen.spacing());
+  }
   taken_.open_window(window);
 }
 

@@ -22,13 +22,15 @@ class TakingBack {
  public:
   TakingBack(Commands& commands, const Config& config, double block_size);
 
-  /// Sends the tables of the window's blocks. The lattice becomes that of the seen points.
+  /// Sends the tables of the window's blocks. The lattice becomes that of the seen points, which should not change any more once there are
+  /// taken points: these would be forgotten.
   void open_window(const MapWindow& window, const SeenPoints& seen);
 
   /// Takes space back behind the surfaces of this frame that the last frames support and that known space contradicts, and gives back what
   /// this frame sees. After that frame->has_taken says whether any point of the window is taken.
   /// @param seen  seen points; open_window() must have been called for both lattices
   /// @return number of pixels whose surface took space back
+  /// @throws cl::Error  the device failed: what was taken back may stay so, as the frame's image says
   std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
                      const SeenPoints& seen, Frame* frame);
 
