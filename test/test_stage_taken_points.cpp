@@ -57,7 +57,7 @@ struct Scene {
     fixture.seen().open_window(fixture.map().window());
     fixture.taken().open_window(fixture.map().window());
     frame = make_frame(fixture.camera(), fixture.map().window(), fixture.views(), &fixture.seen(), fixture.limits());
-    frame.has_taken = full_taken >= 0 ? 1 : 0;
+    frame.has_taken = frame.takes_back = full_taken >= 0 ? 1 : 0;
   }
 
   void settle(Candidates& candidates) {

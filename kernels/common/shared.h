@@ -265,6 +265,7 @@ typedef struct {
   View own_view;                             // of this frame, as its own camera sees it
   SHARED_INT has_color;
   SHARED_INT has_seen, has_taken;  // is any point of the lattice seen?  is any taken back?
+  SHARED_INT takes_back;           // does this frame take space back?
   SHARED_INT seen_shift;           // log2 of the bricks along a block's edge
 } Frame;
 
@@ -276,7 +277,7 @@ static_assert(sizeof(View) == 16 * 4, "View must have no padding");
 static_assert(sizeof(ViewSurfel) == 12 * 4, "ViewSurfel must have no padding");
 static_assert(sizeof(Limits) == 14 * 4, "Limits must have no padding");
 static_assert(sizeof(TakeBackLimits) == 12 * 4, "TakeBackLimits must have no padding");
-static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 4) * 4, "Frame must have no padding");
+static_assert(sizeof(Frame) == (19 + 14 + 7 + 2 * 12 + 16 + 5) * 4, "Frame must have no padding");
 }  // namespace frontier_surfels
 #endif
 

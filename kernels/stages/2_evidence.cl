@@ -65,6 +65,19 @@ INLINE floatv depths_at(const View* view, __global const ushort* depths, intv s,
   return view_depths(depths, as_intv(pixel), view->depth_step);
 }
 
+// The smallest of the 3 x 3 depths that a kept view has around a pixel [m].
+INLINE float smallest_around(const View* view, __global const ushort* depths, int s, int t) {
+  const int columns = (view->width + PATCH_COLUMNS - 1) / PATCH_COLUMNS;
+  __global const ushort* own = depths + view->first_pixel;
+  ushort smallest = 65535;
+  for (int row = t - 1; row <= t + 1; ++row) {
+    __global const ushort* of_row = own + (row / PATCH_ROWS * columns * PATCH_ROWS + row % PATCH_ROWS) * PATCH_COLUMNS;
+    for (int column = s - 1; column <= s + 1; ++column)
+      smallest = min(smallest, of_row[column / PATCH_COLUMNS * (PATCH_ROWS * PATCH_COLUMNS) + column % PATCH_COLUMNS]);
+  }
+  return (float)smallest * view->depth_step;
+}
+
 // How much farther than points a kept view has seen there [m]: its pixel there, and all 3 x 3 pixels around it if it sees farther by
 // `margin`. -INFINITY where it has not looked, or where that is not clear.
 INLINE floatv seen_farther(const View* view, __global const ushort* depths, Points p, floatv margin, intv asked) {
@@ -75,11 +88,19 @@ INLINE floatv seen_farther(const View* view, __global const ushort* depths, Poin
   const floatv middle = depths_at(view, depths, s, t);
   const intv looked = inside & MARK(middle > 0.0f), farther = looked & MARK(middle > q.z + margin);
   if (!any_lane(farther)) return looked ? middle - q.z : (floatv)(-INFINITY);
-  floatv smallest = middle;
-  for (int n = 0; n < 9; ++n)
-    if (n != 4) smallest = fmin(smallest, depths_at(view, depths, s + n % 3 - 1, t + n / 3 - 1));
-  const intv unclear = farther & MARK(smallest <= q.z + margin), known = looked & ~unclear;
-  return known ? (farther ? smallest : middle) - q.z : (floatv)(-INFINITY);
+  float seen[LANES];
+  int column[LANES], row[LANES];
+  vstorev(middle, 0, seen);
+  vstorev(s, 0, column);
+  vstorev(t, 0, row);
+  for (uint left = lane_bits(farther); left != 0; left &= left - 1) {  // mostly few
+    const int n = lowest_lane(left);
+    seen[n] = smallest_around(view, depths, column[n], row[n]);
+  }
+  const floatv smallest = vloadv(0, seen);
+  const intv unclear = farther & MARK(smallest <= q.z + margin);
+  const intv known = looked & ~unclear;
+  return known ? smallest - q.z : (floatv)(-INFINITY);
 }
 
 // Was the space around points seen before, by `margin` [m]: behind them, and beside them along the image's axes?

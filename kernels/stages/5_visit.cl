@@ -99,7 +99,7 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
       intv stay = is_candidate | (rest & MARK((gather_int(observed, at) & bit) == 0));
       const Points normal = rotated(&f.T_camera_local, unpack_normals(s.normal));
       stay &= ~are_seen_through(&f.limits, &f.own_view, depths, &s, normal, stay);
-      if (f.has_taken) stay &= ~are_floating(&f, &taken, depths, &s, normal, stay);
+      if (f.takes_back) stay &= ~are_floating(&f, &taken, depths, &s, normal, stay);
       found.removed = lane_bits(inside & ~stay);
       intv pixel;
       const intv unlabelled = stay & lack_label(s.attributes, f.has_color);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "frame/depth_pixels.hpp"
+#include "frame/row_bands.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -34,19 +35,21 @@ float interpret(float d, const Config& config) {
 DepthPlanes::DepthPlanes(const DepthImage& image, const Config& config, int margin)
     : decimation_(config.decimation), margin_(margin), stride_((image.width + decimation_ - 1) / decimation_ + 2) {
   depth_.assign(static_cast<std::size_t>(image.height + 2 * margin_) * decimation_ * stride_, 0.0F);
-  if (image.encoding == DepthImage::Encoding::kStepsU16)
-    read<std::uint16_t>(image, config);
-  else
-    read<std::uint32_t>(image, config);
+  in_row_bands(image.height, config.threads, [&](int first, int last) {
+    if (image.encoding == DepthImage::Encoding::kStepsU16)
+      read<std::uint16_t>(image, config, first, last);
+    else
+      read<std::uint32_t>(image, config, first, last);
+  });
 }
 
 /// All depths far beyond z_max are alike.
 template <typename Pixel>
-void DepthPlanes::read(const DepthImage& image, const Config& config) {
+void DepthPlanes::read(const DepthImage& image, const Config& config, int first_row, int last_row) {
   const float infinity = std::numeric_limits<float>::infinity(), no_return = config.carve_no_return ? infinity : 0,
               far = static_cast<float>(2 * config.z_max);
   std::vector<float> of_row(image.width);
-  for (int row = 0; row < image.height; ++row) {
+  for (int row = first_row; row < last_row; ++row) {
     const auto* pixels = static_cast<const std::uint8_t*>(image.data) + row * image.step;
     for (int column = 0; column < image.width; ++column) {
       const float raw = to_metres(pixel_at<Pixel>(pixels + column * sizeof(Pixel), image.swap_bytes), config.depth_unit),
@@ -117,17 +120,22 @@ void Sampling::sample_row(const DepthPlanes& planes, int t, Row& row) const {
 
 SampledDepth Sampling::sample(const DepthPlanes& planes, int width, int height) const {
   const std::size_t count = static_cast<std::size_t>(width) * height;
-  std::vector<float> means;
-  means.reserve(count);
-  SampledDepth sampled;
-  sampled.pivots.reserve(count);
-  sampled.whole.reserve(count);
+  std::vector<float> means(count);
+  SampledDepth sampled = {{}, std::vector<float>(count), std::vector<std::uint8_t>(count)};
+  in_row_bands(height, config_.threads, [&](int first, int last) { sample_rows(planes, width, first, last, means.data(), sampled); });
+  sampled.depth = in_range(means, width, height);
+  return sampled;
+}
+
+/// Rows first ... last - 1 of the working image. @param means  of all rows, before in_range()
+void Sampling::sample_rows(const DepthPlanes& planes, int width, int first, int last, float* means, SampledDepth& sampled) const {
   const int edge = 2 * radius_ + 1;
   Row row(width);
-  for (int t = 0; t < height; ++t) {
+  for (int t = first; t < last; ++t) {
     sample_row(planes, t, row);
     const float* middle = planes.every(0, config_.decimation * t);
     for (int s = 0; s < width; ++s) {
+      const std::size_t n = static_cast<std::size_t>(t) * width + s;
       const int agree = row.agree[s], nearer = row.nearer[s], farther = row.farther[s];
       float pivot = middle[s], mean = row.sum[s] / static_cast<float>(std::max(agree, 1));
       if (std::isinf(pivot)) {
@@ -135,13 +143,11 @@ SampledDepth Sampling::sample(const DepthPlanes& planes, int width, int height) 
       } else if (agree < least_ || (nearer > agree && farther > agree)) {
         mean = agree + nearer + farther < least_ ? 0 : fill(planes, s, t, &pivot);
       }
-      means.push_back(mean);
-      sampled.whole.push_back(agree == edge * edge ? 1 : 0);
-      sampled.pivots.push_back(mean > 0 && std::isfinite(mean) ? pivot : 0);
+      means[n] = mean;
+      sampled.whole[n] = agree == edge * edge ? 1 : 0;
+      sampled.pivots[n] = mean > 0 && std::isfinite(mean) ? pivot : 0;
     }
   }
-  sampled.depth = in_range(means, width, height);
-  return sampled;
 }
 
 /// For a block whose middle pixel is lost, or measures what few others do. @return 0: no measurement

@@ -35,7 +35,7 @@ class DepthPlanes {
 
  private:
   template <typename Pixel>
-  void read(const DepthImage& image, const Config& config);
+  void read(const DepthImage& image, const Config& config, int first_row, int last_row);
 
   int decimation_, margin_, stride_;
   std::vector<float> depth_;  ///< [rows][decimation][stride_]
@@ -71,6 +71,7 @@ class Sampling {
 
  private:
   struct Row;
+  void sample_rows(const DepthPlanes& planes, int width, int first, int last, float* means, SampledDepth& sampled) const;
   void sample_row(const DepthPlanes& planes, int t, Row& row) const;
   float fill(const DepthPlanes& planes, int s, int t, float* pivot) const;
   bool has_no_return(const DepthPlanes& planes, int s, int t) const;

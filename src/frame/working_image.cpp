@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "frame/depth_pixels.hpp"
+#include "frame/row_bands.hpp"
 #include "frame/sampling.hpp"
 #include "frame/view_grid.hpp"
 #include "frontier_surfels/number_text.hpp"
@@ -102,12 +103,13 @@ class MeanColors {
   MeanColors(const ColorImage& color, const DepthPlanes& planes, const Sampling& sampling, const Config& config)
       : color_(color), planes_(planes), sampling_(sampling), decimation_(config.decimation), of_columns_(color.width * color.channels) {}
 
-  void append_row(int t, const SampledDepth& sampled, std::vector<std::uint32_t>& colors, int width) {
+  /// @param colors  of the row
+  void fill_row(int t, const SampledDepth& sampled, std::uint32_t* colors, int width) {
     const int row = decimation_ * t, radius = sampling_.radius();
     add_rows(std::max(row - radius, 0), std::min(row + radius, color_.height - 1));
     for (int s = 0; s < width; ++s) {
-      const std::size_t n = colors.size();
-      colors.push_back(sampled.whole[n] ? of_whole_block(decimation_ * s) : of_some(s, t, sampled.pivots[n]));
+      const std::size_t n = static_cast<std::size_t>(t) * width + s;
+      colors[s] = sampled.whole[n] ? of_whole_block(decimation_ * s) : of_some(s, t, sampled.pivots[n]);
     }
   }
 
@@ -166,9 +168,12 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
   SampledDepth sampled = sampling.sample(planes, image.intrinsics.width, image.intrinsics.height);
   image.depth = std::move(sampled.depth);
   if (!frame.color) return;
-  image.color.reserve(image.depth.size());
-  MeanColors colors(*frame.color, planes, sampling, config);
-  for (int t = 0; t < image.intrinsics.height; ++t) colors.append_row(t, sampled, image.color, image.intrinsics.width);
+  image.color.resize(image.depth.size());
+  const int width = image.intrinsics.width;
+  in_row_bands(image.intrinsics.height, config.threads, [&](int first, int last) {
+    MeanColors colors(*frame.color, planes, sampling, config);
+    for (int t = first; t < last; ++t) colors.fill_row(t, sampled, &image.color[static_cast<std::size_t>(t) * width], width);
+  });
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TakeBackLimits make_take_back_limits(const Config& config) {
   limits.strong_supports = 5;
   limits.contradictions = 3;
   limits.opinions = 8;
-  limits.newer_opinions = 40;
+  limits.newer_opinions = 16;
   return limits;
 }
 
@@ -72,6 +72,7 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
   const auto count = static_cast<std::size_t>(std::count(chosen.begin(), chosen.end(), 1));
   const std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
   frame->has_taken = 0;
+  frame->takes_back = count > 0 ? 1 : 0;
   if (bricks.empty()) return 0;
   change_bricks(*frame, camera, views, window, count > 0, bricks);
   taken_.open_window(window);

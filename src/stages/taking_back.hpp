@@ -27,7 +27,8 @@ class TakingBack {
   void open_window(const MapWindow& window, const SeenPoints& seen);
 
   /// Takes space back behind the surfaces of this frame that the last frames support and that known space contradicts, and gives back what
-  /// this frame sees. After that frame->has_taken says whether any point of the window is taken.
+  /// this frame sees. After that frame->has_taken says whether any point of the window is taken, and frame->takes_back
+  /// whether this frame has taken some.
   /// @param seen  seen points; open_window() must have been called for both lattices
   /// @return number of pixels whose surface took space back
   /// @throws cl::Error  the device failed: what was taken back may stay so, as the frame's image says
