@@ -74,6 +74,7 @@ class MapperDeviceFaults : public testing::Test {
     EXPECT_GE(report.split, wanted.split);
     EXPECT_GE(report.removed, wanted.removed);
     EXPECT_GE(report.created, wanted.created);
+    EXPECT_GE(report.taken_back, wanted.taken_back);
     const Seen before(*undisturbed);
     const SavedMap memory_before = undisturbed->saved_map();
     undisturbed->integrate(frames[at].view());
@@ -122,6 +123,18 @@ TEST_F(MapperDeviceFaults, AFrameThatRemovesAndCreates) {
   Report wanted;
   wanted.removed = wanted.created = 100;
   fail_everywhere(undecimated(), orbit_frames(small_camera(), 4, 6), 2, wanted);
+}
+
+/// A box that is put down: the frame takes space back, and what floats there goes.
+TEST_F(MapperDeviceFaults, AFrameThatTakesSpaceBack) {
+  Frames frames;
+  for (int n = 0; n < 20; ++n) {
+    frames.push_back(plane_frame(small_camera(), 2, Eigen::Isometry3d(Eigen::Translation3d(0.008 * n, 0, 0))));
+    if (n >= 12) frames.back().depth(cv::Rect(12, 8, 16, 14)) = 1.5;
+  }
+  Report wanted;
+  wanted.taken_back = 50;
+  fail_everywhere(undecimated(), frames, 17, wanted);
 }
 
 /// As before, and with known space from the surfels, because views have been forgotten.

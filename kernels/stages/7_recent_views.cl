@@ -3,13 +3,12 @@
 // A tile's candidates are listed, and kept views asked of all of them, LANES at once; a candidate that one knows is settled. The views that
 // know some of a few probes are asked first, as they settle most. What is left has a box, and the other views that may know something of
 // that box are asked; 9_thin_gaps and 17_creation ask the same ones.
-
-#define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
-#define TILE_CHUNKS (TILE_ENTRIES / LANES)
-
 //
 // Candidates at points that were taken back (3_taking_back) stay, whatever the views know: no view is asked for them, neither here nor
 // later.
+
+#define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
+#define TILE_CHUNKS (TILE_ENTRIES / LANES)
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {

@@ -64,7 +64,8 @@ __kernel void close_gaps(const Frame f, __global const View* views, __global con
   ViewsAround around;
   find_views_around(&f.grid, views, tile_views, view_groups, v, &around);
   const SeenPoints taken = {slots, tables, bricks};
-  const intv left_out = f.has_taken ? seen_before(&f, &taken, center, open) : 0;
+  intv left_out = 0;  // what views know there does not count
+  if (f.has_taken) left_out = seen_before(&f, &taken, center, open) | seen_before(&f, &taken, behind, open);
   open &= ~any_view_knows(&around, depths, behind, open & ~left_out);
   int closed[LANES];
   vstorev(numbers, 0, closed);

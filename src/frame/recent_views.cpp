@@ -185,10 +185,10 @@ View RecentViews::view_from_current(const Intrinsics& intrinsics, const Eigen::I
   return to_view({intrinsics, T_world_camera, 0, 0, 0}, T_world_camera.inverse() * current_.T_world_camera);
 }
 
-std::vector<View> RecentViews::views_before(std::uint64_t frames) const {
+std::vector<View> RecentViews::views_before(std::uint64_t number) const {
   std::vector<View> views;
   for (const Kept& kept : kept_)
-    if (kept.number + frames < current_.number) views.push_back(to_view(kept, kept.T_world_camera.inverse() * current_.T_world_camera));
+    if (kept.number < number) views.push_back(to_view(kept, kept.T_world_camera.inverse() * current_.T_world_camera));
   return views;
 }
 

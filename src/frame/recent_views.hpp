@@ -51,8 +51,10 @@ class RecentViews {
   /// Any view as this frame's camera sees it, without an image.
   View view_from_current(const Intrinsics& intrinsics, const Eigen::Isometry3d& T_world_camera) const;
 
-  /// The kept views that are older than so many frames before the current one, newest first.
-  std::vector<View> views_before(std::uint64_t frames) const;
+  std::uint64_t current_number() const { return current_.number; }  ///< see numbers()
+
+  /// The kept views that came before the one with this number, newest first.
+  std::vector<View> views_before(std::uint64_t number) const;
 
   /// Sends the kept views to the device, each with its pose relative to the current camera. @return their number
   int prepare();

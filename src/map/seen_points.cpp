@@ -158,11 +158,16 @@ cl_int SeenPoints::own_brick(int table, int brick) {
   const cl_int before = entry(table, brick);
   if (before > SEEN_BRICK_FULL) return before;
   if (before == SEEN_BRICK_EMPTY) return add_brick(table, brick);
-  const cl_int number = take_bricks(1).front();
-  bricks_.grow(SEEN_WORDS * used_, bricks_.size());
-  bricks_.fill("taking_back", ~cl_ulong{0}, SEEN_WORDS, static_cast<std::size_t>(SEEN_WORDS) * number);
-  set_entry(table, brick, number);
-  return number;
+  const std::vector<cl_int> number = take_bricks(1);
+  try {
+    bricks_.grow(SEEN_WORDS * used_, bricks_.size());
+    bricks_.fill("taking_back", ~cl_ulong{0}, SEEN_WORDS, static_cast<std::size_t>(SEEN_WORDS) * number.front());
+  } catch (...) {
+    give_back(number);
+    throw;
+  }
+  set_entry(table, brick, number.front());
+  return number.front();
 }
 
 void SeenPoints::set_uniform(int table, int brick, bool seen) {

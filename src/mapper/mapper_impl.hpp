@@ -67,8 +67,7 @@ struct Mapper::Impl {
   double seen_spacing(const Camera& camera) const;
   SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
-  void finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, const Camera& camera,
-                    Report& report);
+  void finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Report& report);
   Changes changes(std::uint64_t since);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);

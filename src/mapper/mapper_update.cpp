@@ -93,7 +93,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  finish_frame(number, image, input.T_world_camera, camera, report);
+  finish_frame(number, image, input.T_world_camera, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
@@ -134,11 +134,10 @@ void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T
   if (!changed) frame_on_device = exact;
 }
 
-void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera,
-                                const Camera& camera, Report& report) {
+void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Report& report) {
   map.finish_frame("labels", number);
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
-  taking_back.add_to_last_frames(camera, image, T_world_camera);
+  taking_back.add_to_last_frames(image, T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
   report.view_kept = views.keep_current();
   sequence = report.sequence;

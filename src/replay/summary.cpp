@@ -232,7 +232,7 @@ std::string result_table(const ordered_json& summary) {
   table += formatted("surfels     %.0f: %.0f occupied, %.0f frontier; %.1f MB\n", surfels["total"], surfels["occupied"],
                      surfels["frontier"], surfels["map_bytes"].get<double>() / 1e6);
   if (surfels["taken_back"] > 0)
-    table += formatted("taken back  at %.0f places: surfaces that stood where space was seen to be free before\n", surfels["taken_back"]);
+    table += formatted("taken back  by %.0f pixels, whose surface stood where space was seen to be free before\n", surfels["taken_back"]);
   table +=
       formatted("time        median %.1f ms a frame, 95 %% below %.1f ms, at most %.1f ms\n", time["median"], time["p95"], time["max"]);
   const auto percent = [](const ordered_json& share) { return 100 * share.get<double>(); };

@@ -50,6 +50,7 @@ TakingBack::TakingBack(Commands& commands, const Config& config, double block_si
 
 void TakingBack::clear() {
   last_frames_.clear();
+  pixels_ = 0;
   taken_.clear();
 }
 
@@ -60,7 +61,7 @@ void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
     taken_.clear();
     taken_.choose_spacing(seen.spacing());
   }
-  taken_.open_window(window);
+  if (!taken_.empty()) taken_.open_window(window);
 }
 
 std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
@@ -70,21 +71,34 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
   std::vector<cl_uchar> chosen;
   if (find_evidence(*frame, camera, views, seen)) chosen = choose_pixels(*frame, camera, views, seen);
   const auto count = static_cast<std::size_t>(std::count(chosen.begin(), chosen.end(), 1));
+  if (count == 0 && taken_.empty()) return pixels_;
+  pixels_ = std::max(pixels_, count);  // before anything is changed
   const std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
-  frame->has_taken = 0;
-  frame->takes_back = count > 0 ? 1 : 0;
-  if (bricks.empty()) return 0;
-  change_bricks(*frame, camera, views, window, count > 0, bricks);
-  taken_.open_window(window);
-  for (const Brick& b : bricks)
-    if (taken_.entry(b.table, b.brick) != SEEN_BRICK_EMPTY) frame->has_taken = 1;
-  return count;
+  if (!bricks.empty()) {
+    change_bricks(*frame, camera, views, window, count > 0, bricks);
+    taken_.open_window(window);
+  }
+  frame->has_taken = any_taken(window) ? 1 : 0;
+  frame->takes_back = pixels_ > 0 ? 1 : 0;
+  return pixels_;
+}
+
+/// Is any point of the window taken?
+bool TakingBack::any_taken(const MapWindow& window) {
+  for (int cell = 0; cell < window.cells(); ++cell) {
+    if (!taken_.has_table(window.block(cell))) continue;
+    const int table = taken_.table(window.block(cell));
+    for (int brick = 0; brick < taken_.bricks_of_block(); ++brick)
+      if (taken_.entry(table, brick) != SEEN_BRICK_EMPTY) return true;
+  }
+  return false;
 }
 
 /// @return whether any of the coarse pixels has strong evidence
 bool TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
   if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return false;
-  std::vector<View> last, older = views.views_before(LAST_FRAMES);
+  std::vector<View> last, older = views.views_before(last_frames_.back().number);
+  if (older.empty() && frame.has_seen == 0) return false;
   for (const LastFrame& other : last_frames_) {
     last.push_back(views.view_from_current(other.intrinsics, other.T_world_camera));
     last.back().first_pixel = static_cast<std::uint32_t>(other.room * room_size_);
@@ -120,7 +134,27 @@ std::vector<cl_uchar> TakingBack::choose_pixels(const Frame& frame, const Camera
   return chosen_.read(pixels);
 }
 
-/// The bricks of the window that have taken points already, and those that may get some behind chosen pixels.
+/// May this frame see something of a cube? @param center  camera frame [m]; radius: of the sphere around the cube [m]
+bool TakingBack::may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const {
+  const double near = center.z() - radius, far = center.z() + radius;
+  if (far <= 0) return false;
+  if (near <= 0.01) return true;
+  const auto range = [&](double x, double f, double c, int size) {
+    const auto high = [&](double side) { return c + f * std::max(side / near, side / far); };
+    const auto low = [&](double side) { return c + f * std::min(side / near, side / far); };
+    return std::pair(static_cast<int>(std::max(std::floor(low(x - radius)), 0.0)),
+                     static_cast<int>(std::min(std::ceil(high(x + radius)), size - 1.0)));
+  };
+  const Intrinsics& camera = image.intrinsics;
+  const auto [left, right] = range(center.x(), camera.fx, camera.cx, camera.width);
+  const auto [top, bottom] = range(center.y(), camera.fy, camera.cy, camera.height);
+  for (int t = top; t <= bottom; ++t)
+    for (int s = left; s <= right; ++s)
+      if (std::abs(image.depth[static_cast<std::size_t>(t) * camera.width + s]) > near) return true;
+  return false;
+}
+
+/// The bricks of the window with taken points of which this frame may see something, and those that may get some behind chosen pixels.
 std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
                                                             const std::vector<cl_uchar>& chosen) {
   const Grid& g = frame.grid;
@@ -155,9 +189,9 @@ std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, 
     const int table = taken_.table(window.block(cell));
     for (int brick = 0; brick < taken_.bricks_of_block(); ++brick) {
       const Eigen::Array3i at = place_of(cell, brick);
-      if (taken_.entry(table, brick) == SEEN_BRICK_EMPTY) continue;
-      behind.erase({at.x(), at.y(), at.z()});
-      bricks.push_back({table, brick, {{at.x(), at.y(), at.z(), 0}}});
+      if (taken_.entry(table, brick) == SEEN_BRICK_EMPTY || behind.count({at.x(), at.y(), at.z()}) != 0) continue;
+      const Eigen::Vector3d center = window.T_camera_local() * ((at.cast<double>() + 0.5).matrix() * brick_size);
+      if (may_see(image, center, std::sqrt(0.75) * brick_size + 1e-3)) bricks.push_back({table, brick, {{at.x(), at.y(), at.z(), 0}}});
     }
   }
   for (const auto& [x, y, z] : behind) {
@@ -192,21 +226,20 @@ void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const R
     if (states[n] != SEEN_MIXED) taken_.set_uniform(bricks[n].table, bricks[n].brick, states[n] == SEEN_ALL);
 }
 
-void TakingBack::add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
+void TakingBack::add_to_last_frames(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint64_t number) {
   if (!is_on_) return;
   const std::size_t pixels = image.depth.size();
   if (pixels > room_size_) {
-    last_frames_.clear();
     images_.allocate(LAST_FRAMES * pixels);
+    last_frames_.clear();
     room_size_ = pixels;
   }
-  std::size_t room = last_frames_.size();
-  if (room == LAST_FRAMES) {
-    room = last_frames_.back().room;
-    last_frames_.pop_back();
-  }
-  commands_.queue().enqueueCopyBuffer(camera.depth()(), images_(), 0, room * room_size_ * sizeof(float), pixels * sizeof(float));
-  last_frames_.push_front({image.intrinsics, T_world_camera, room});
+  const bool is_full = last_frames_.size() == LAST_FRAMES;
+  const std::size_t room = is_full ? last_frames_.back().room : last_frames_.size();
+  images_.send(image.depth, room * room_size_);
+  if (is_full) last_frames_.pop_back();
+  last_frames_.push_front({image.intrinsics, T_world_camera, room, number});
+  pixels_ = 0;
 }
 
 }  // namespace frontier_surfels

@@ -31,12 +31,13 @@ class TakingBack {
   /// whether this frame has taken some.
   /// @param seen  seen points; open_window() must have been called for both lattices
   /// @return number of pixels whose surface took space back
-  /// @throws cl::Error  the device failed: what was taken back may stay so, as the frame's image says
+  /// @throws cl::Error  the device failed: what was taken back stays so, and counts for the next frame
   std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
                      const SeenPoints& seen, Frame* frame);
 
-  /// Lets later frames ask whether this one supports their surfaces.
-  void add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera);
+  /// Ends a frame: later ones may ask whether it supports their surfaces.
+  /// @param number  RecentViews::current_number()
+  void add_to_last_frames(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint64_t number);
 
   /// Forgets all frames and all taken points.
   void clear();
@@ -57,12 +58,15 @@ class TakingBack {
     Intrinsics intrinsics;
     Eigen::Isometry3d T_world_camera;
     std::size_t room = 0;  ///< of images_
+    std::uint64_t number = 0;
   };
   struct Brick {
     int table, brick;
     cl_int4 place;  ///< x, y, z, counted in bricks from the window's corner, and its number
   };
 
+  bool any_taken(const MapWindow& window);
+  bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
   bool find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<Brick> bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
@@ -77,6 +81,7 @@ class TakingBack {
   const bool is_on_;
   SeenPoints taken_;
   std::deque<LastFrame> last_frames_;  ///< newest first, at most LAST_FRAMES
+  std::size_t pixels_ = 0;             ///< whose surface has taken space back since the last frame that did not fail
   std::size_t room_size_ = 0;          ///< [pixel]
   DeviceArray<float> images_;          ///< [LAST_FRAMES][room_size_]: depths of the last frames
   SentArray<View> frame_views_, older_views_;

@@ -104,7 +104,7 @@ class TakingBackFixture : public FrameFixture {
   }
 
   void end(bool keep) {
-    taking.add_to_last_frames(camera(), now.image, now.T_world_camera);
+    taking.add_to_last_frames(now.image, now.T_world_camera, views().current_number());
     if (now.image.depth.size() > largest_) {
       largest_ = now.image.depth.size();
       last.clear();  // as images had no room, they are gone
@@ -121,7 +121,7 @@ class TakingBackFixture : public FrameFixture {
   std::vector<reference::SeenView> older() const {
     std::vector<reference::SeenView> views;
     for (const auto& [view, number] : kept_)
-      if (number + LAST_FRAMES < number_) views.push_back(view);
+      if (number + static_cast<int>(last.size()) < number_) views.push_back(view);
     return views;
   }
 
