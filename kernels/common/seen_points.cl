@@ -157,6 +157,14 @@ INLINE int cube_in_view(const View* view, __global const ushort* depths, float3 
 // Edge of the lattice's cells [m].
 INLINE float seen_spacing(const Window* window, int shift) { return window->block_size / (float)(SEEN_BRICK << shift); }
 
+// LANES points of a word, from bit `bit` on: in the window's frame [m].
+//   first: the word's first point, counted from the window's corner
+INLINE Points points_of_word(int3 first, int bit, float spacing) {
+  const intv point = bit + lane_numbers();
+  return (Points){(convert_floatv(first.x + (point & 3)) + 0.5f) * spacing, (convert_floatv(first.y + (point >> 2 & 3)) + 0.5f) * spacing,
+                  (convert_floatv(first.z + (point >> 4)) + 0.5f) * spacing};
+}
+
 // Words along an edge of the cubes that one work item of see_points or take_points handles, and such cubes in a brick: a cube that the view
 // knows nothing of is done with at once.
 #define SEE_EDGE (LANES == 1 ? 1 : 2)

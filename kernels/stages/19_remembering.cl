@@ -42,10 +42,8 @@ __kernel void see_points(const Window window, const View view, const int shift, 
     const int3 of_word = first + 4 * (int3)(w & 1, w >> 1 & 1, w >> 2);
     ulong seen = before;
     for (int bit = 0; bit < 64; bit += LANES) {
-      const intv point = bit + lane_numbers(), open = ~lane_marks((uint)(before >> bit));
-      const Points p = {(convert_floatv(of_word.x + (point & 3)) + 0.5f) * spacing,
-                        (convert_floatv(of_word.y + (point >> 2 & 3)) + 0.5f) * spacing,
-                        (convert_floatv(of_word.z + (point >> 4)) + 0.5f) * spacing};
+      const intv open = ~lane_marks((uint)(before >> bit));
+      const Points p = points_of_word(of_word, bit, spacing);
       seen |= (ulong)lane_bits(knows(&view, depths, p, open)) << bit;
     }
     if (seen != before) words[SEE_WORD(w)] = seen;

@@ -47,10 +47,7 @@ __kernel void take_points(const Frame f, const TakeBackLimits limits, const View
     const int3 of_word = first + 4 * (int3)(w & 1, w >> 1 & 1, w >> 2);
     ulong taken = 0;
     for (int bit = 0; bit < 64; bit += LANES) {
-      const intv point = bit + lane_numbers();
-      const Points p = {(convert_floatv(of_word.x + (point & 3)) + 0.5f) * spacing,
-                        (convert_floatv(of_word.y + (point >> 2 & 3)) + 0.5f) * spacing,
-                        (convert_floatv(of_word.z + (point >> 4)) + 0.5f) * spacing};
+      const Points p = points_of_word(of_word, bit, spacing);
       intv is_taken = lane_marks((uint)(before >> bit));
       if (has_chosen) is_taken |= behind_chosen(&f.grid, &limits, &own_view, depth, chosen, p);
       if (any_lane(is_taken)) is_taken &= ~knows(&own_view, depths, p, is_taken);

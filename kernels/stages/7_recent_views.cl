@@ -165,22 +165,26 @@ INLINE uint open_chunks(const Grid* g, int3 tile, __global const float* layer_de
   return count;
 }
 
+// Closes the entries in a work item's chunks that lie at points of a lattice: seen points, or those that were taken back.
+INLINE void ask_lattice(const Frame* f, const SeenPoints* lattice, uint chunks, __local Tile* own) {
+  const int item = get_local_id(0), items = get_local_size(0);
+  for (uint n = 0; n < chunks; ++n) {
+    const int chunk = own->chunks[n * items + item];
+    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
+    const intv open = lane_marks(own->open[chunk]);
+    own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, lattice, center, open));
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+
 // Takes those off a tile's list that lie at points that were taken back, and notes them. Returns whether any point near the tile's
 // candidates was taken back.
 INLINE bool set_taken_aside(const Frame* f, const SeenPoints* taken, int3 tile, __global const float* layer_depth, __local Tile* own) {
   Box box;
   find_candidates_box(&f->grid, own, tile, layer_depth, f->limits.min_gap, &box);
   if (seen_in_box(f, taken, &box) == SEEN_NONE) return false;
-  const int item = get_local_id(0), items = get_local_size(0);
-  const uint chunks = open_chunks(&f->grid, tile, layer_depth, own);
-  for (uint n = 0; n < chunks; ++n) {
-    const int chunk = own->chunks[n * items + item];
-    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
-    const intv open = lane_marks(own->open[chunk]);
-    own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, taken, center, open));
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (item == 0) {
+  ask_lattice(f, taken, open_chunks(&f->grid, tile, layer_depth, own), own);
+  if (get_local_id(0) == 0) {
     const int first_bit = tile.z * VIEW_TILE_K % 64;
     for (uint n = 0; n < own->entry_count; ++n)
       if ((own->open[n / LANES] >> (n % LANES) & 1) == 0)
@@ -229,17 +233,10 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
 //   box: around them
 INLINE int ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __global const float* layer_depth, const Box* box,
                       __local Tile* own) {
-  const int item = get_local_id(0), items = get_local_size(0), in_box = seen_in_box(f, seen, box);
+  const int in_box = seen_in_box(f, seen, box);
   if (in_box == SEEN_NONE) return in_box;
-  const uint chunks = in_box == SEEN_ALL ? 0 : open_chunks(&f->grid, tile, layer_depth, own);
-  for (uint n = 0; n < chunks; ++n) {
-    const int chunk = own->chunks[n * items + item];
-    const Points center = {vloadv(0, own->centers[chunk][0]), vloadv(0, own->centers[chunk][1]), vloadv(0, own->centers[chunk][2])};
-    const intv open = lane_marks(own->open[chunk]);
-    own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, seen, center, open));
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (item == 0) {
+  ask_lattice(f, seen, in_box == SEEN_ALL ? 0 : open_chunks(&f->grid, tile, layer_depth, own), own);
+  if (get_local_id(0) == 0) {
     if (in_box == SEEN_ALL)
       own->entry_count = 0;
     else

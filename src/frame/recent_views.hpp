@@ -44,9 +44,8 @@ class RecentViews {
   void make_room(const std::vector<SavedView>& views);
 
   View own_view() const;  ///< the current view, seen from its own camera
-  View own_view_from(const Eigen::Isometry3d& T_camera_local) const {
-    return to_view(current_, T_camera_local);
-  }  ///< from the frame `local`
+  /// The current view, seen from the frame `local`.
+  View own_view_from(const Eigen::Isometry3d& T_camera_local) const { return to_view(current_, T_camera_local); }
 
   /// Any view as this frame's camera sees it, without an image.
   View view_from_current(const Intrinsics& intrinsics, const Eigen::Isometry3d& T_world_camera) const;

@@ -4,18 +4,18 @@
 #include <algorithm>
 #include <future>
 #include <system_error>
-#include <thread>
 #include <vector>
+
+#include "config/threads.hpp"
 
 namespace frontier_surfels {
 
 /// Calls work(first, last) for bands of rows, first ... last - 1, that make up all rows, on `threads` threads, the calling one among them.
-/// An exception of any of them is thrown again here. @param threads  0: as many as the machine has
+/// An exception of any of them is thrown again here. @param threads  Config::threads
 template <typename Work>
 void in_row_bands(int rows, int threads, Work work) {
   constexpr int kMostThreads = 8, kLeastRows = 16;  // more threads would take longer to start than they save
-  const int machine = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const int bands = std::clamp(std::min(threads == 0 ? machine : threads, rows / kLeastRows), 1, kMostThreads);
+  const int bands = std::clamp(std::min(threads_of_host(threads), rows / kLeastRows), 1, kMostThreads);
   const auto begin = [&](int band) { return static_cast<int>(static_cast<long>(rows) * band / bands); };
   std::vector<std::future<void>> others;
   int band = 1;

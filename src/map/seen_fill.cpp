@@ -6,11 +6,11 @@
 #include <limits>
 #include <new>
 #include <system_error>
-#include <thread>
 #include <tuple>
 #include <utility>
 
 #include "common/shared.h"
+#include "config/threads.hpp"
 #include "map/seen_block.hpp"
 #include "map/seen_labels.hpp"
 #include "map/seen_points.hpp"
@@ -236,11 +236,6 @@ SeenSpace result(const Search& search, double block_size, int shift) {
     seen.blocks.push_back({{block.x, block.y, block.z}, bytes.take()});
   }
   return seen;
-}
-
-int threads_of_host(int wanted) {
-  const int most = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  return wanted == 0 ? most : std::min(wanted, most);
 }
 
 }  // namespace

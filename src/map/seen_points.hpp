@@ -92,6 +92,9 @@ class SeenPoints {
   std::size_t bytes() const;                                       ///< memory on the device and the host
   std::size_t bricks() const { return used_ - free_.size() - 2; }  ///< with points that are seen and points that are not
 
+  /// Work items of the kernels that handle a cube of words each (SEE_CUBES), for so many bricks.
+  std::size_t cubes(std::size_t bricks) const { return bricks * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8); }
+
   const cl::Buffer& slots() const { return slots_(); }
   const cl::Buffer& tables() const { return tables_on_device_(); }
   const cl::Buffer& brick_words() const { return bricks_(); }

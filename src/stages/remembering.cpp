@@ -82,7 +82,7 @@ std::vector<cl_uchar> Remembering::see_points(const Window& window, const View& 
   if (asked.empty()) return {};
   seen.send_entries(kStage);
   const auto count = static_cast<cl_int>(asked.size());
-  const std::size_t cubes = asked.size() * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8);
+  const std::size_t cubes = seen.cubes(asked.size());
   seen_by_.send(std::move(asked));
   states_.resize(count);
   commands_.run(kStage, "see_points", cubes, commands_.device().heavy_group(), window, view, static_cast<cl_int>(seen.shift()),

@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
-#include <tuple>
 #include <utility>
 
 namespace frontier_surfels {
 namespace {
 
 constexpr const char* kStage = "taking_back";
-
-std::size_t pixels_of(const Grid& g) { return static_cast<std::size_t>(g.width) * g.height; }
 
 }  // namespace
 
@@ -78,20 +74,27 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
     change_bricks(*frame, camera, views, window, count > 0, bricks);
     taken_.open_window(window);
   }
-  frame->has_taken = any_taken(window) ? 1 : 0;
+  frame->has_taken = bricks_with_points(window).empty() ? 0 : 1;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
 }
 
-/// Is any point of the window taken?
-bool TakingBack::any_taken(const MapWindow& window) {
+/// The bricks of the window that have taken points.
+std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& window) {
+  const int sides = 1 << taken_.shift();
+  const Window& w = window.window();
+  std::vector<Brick> bricks;
   for (int cell = 0; cell < window.cells(); ++cell) {
     if (!taken_.has_table(window.block(cell))) continue;
     const int table = taken_.table(window.block(cell));
     for (int brick = 0; brick < taken_.bricks_of_block(); ++brick)
-      if (taken_.entry(table, brick) != SEEN_BRICK_EMPTY) return true;
+      if (taken_.entry(table, brick) != SEEN_BRICK_EMPTY)
+        bricks.push_back({table,
+                          brick,
+                          {{cell % w.size_x * sides + brick % sides, cell / w.size_x % w.size_y * sides + brick / sides % sides,
+                            cell / w.size_x / w.size_y * sides + brick / sides / sides, 0}}});
   }
-  return false;
+  return bricks;
 }
 
 /// @return whether any of the coarse pixels has strong evidence
@@ -126,7 +129,7 @@ void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame
 /// @return [height][width]: 1 for pixels whose surface takes space back
 std::vector<cl_uchar> TakingBack::choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views,
                                                 const SeenPoints& seen) {
-  const std::size_t pixels = pixels_of(frame.grid), rows = frame.grid.height;
+  const std::size_t rows = frame.grid.height, pixels = frame.grid.width * rows;
   for (DeviceArray<cl_uchar>* image : {&evidence_, &squares_, &chosen_}) image->resize(pixels);
   weigh("weigh_evidence", commands_.chunks(frame.grid.width) * rows, frame, camera, views, seen, coarse_(), evidence_());
   commands_.run(kStage, "find_squares", pixels, kGroup, frame, evidence_(), squares_());
@@ -154,13 +157,12 @@ bool TakingBack::may_see(const WorkingImage& image, const Eigen::Vector3d& cente
   return false;
 }
 
-/// The bricks of the window with taken points of which this frame may see something, and those that may get some behind chosen pixels.
-std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
-                                                            const std::vector<cl_uchar>& chosen) {
-  const Grid& g = frame.grid;
+/// Places, counted in bricks from the window's corner, that the points behind chosen pixels may lie in.
+std::set<TakingBack::Place> TakingBack::places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
+                                                      const std::vector<cl_uchar>& chosen) const {
   const Eigen::Isometry3d T_local_camera = window.T_camera_local().inverse();
   const double brick_size = SEEN_BRICK * taken_.spacing();
-  std::set<std::tuple<int, int, int>> behind;  // x, y, z, counted in bricks from the window's corner
+  std::set<Place> behind;
   for (std::size_t n = 0; n < chosen.size(); ++n) {
     if (chosen[n] == 0) continue;
     const double s = static_cast<double>(n % g.width) - image.intrinsics.cx, t = static_cast<double>(n / g.width) - image.intrinsics.cy;
@@ -174,26 +176,25 @@ std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, 
                          last = (box.max() / brick_size).array().floor().cast<int>();
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
-        for (int x = first.x(); x <= last.x(); ++x) behind.emplace(x, y, z);
+        for (int x = first.x(); x <= last.x(); ++x) behind.insert({x, y, z});
   }
+  return behind;
+}
 
+/// The bricks of the window with taken points of which this frame may see something, and those that may get some behind chosen pixels.
+std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
+                                                            const std::vector<cl_uchar>& chosen) {
+  const std::set<Place> behind = places_behind(frame.grid, window, image, chosen);
+  const double brick_size = SEEN_BRICK * taken_.spacing();
+  std::vector<Brick> bricks;
+  for (const Brick& brick : bricks_with_points(window)) {
+    const Place place = {brick.place.s[0], brick.place.s[1], brick.place.s[2]};
+    const Eigen::Vector3d middle = Eigen::Vector3d(place[0], place[1], place[2]).array() + 0.5;
+    if (behind.count(place) == 0 && may_see(image, window.T_camera_local() * (middle * brick_size), std::sqrt(0.75) * brick_size + 1e-3))
+      bricks.push_back(brick);
+  }
   const int shift = taken_.shift(), sides = 1 << shift;
   const Window& w = window.window();
-  const auto place_of = [&](int cell, int brick) {
-    return Eigen::Array3i(cell % w.size_x * sides + brick % sides, cell / w.size_x % w.size_y * sides + brick / sides % sides,
-                          cell / w.size_x / w.size_y * sides + brick / sides / sides);
-  };
-  std::vector<Brick> bricks;
-  for (int cell = 0; cell < window.cells(); ++cell) {
-    if (!taken_.has_table(window.block(cell))) continue;
-    const int table = taken_.table(window.block(cell));
-    for (int brick = 0; brick < taken_.bricks_of_block(); ++brick) {
-      const Eigen::Array3i at = place_of(cell, brick);
-      if (taken_.entry(table, brick) == SEEN_BRICK_EMPTY || behind.count({at.x(), at.y(), at.z()}) != 0) continue;
-      const Eigen::Vector3d center = window.T_camera_local() * ((at.cast<double>() + 0.5).matrix() * brick_size);
-      if (may_see(image, center, std::sqrt(0.75) * brick_size + 1e-3)) bricks.push_back({table, brick, {{at.x(), at.y(), at.z(), 0}}});
-    }
-  }
   for (const auto& [x, y, z] : behind) {
     if (x < 0 || y < 0 || z < 0 || x >= w.size_x << shift || y >= w.size_y << shift || z >= w.size_z << shift) continue;
     const int cell = ((z >> shift) * w.size_y + (y >> shift)) * w.size_x + (x >> shift);
@@ -213,11 +214,10 @@ void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const R
   }
   taken_.send_entries(kStage);
   const auto count = static_cast<cl_int>(bricks.size());
-  const std::size_t cubes = bricks.size() * (commands_.lanes() == 1 ? SEEN_WORDS : SEEN_WORDS / 8);
   taken_by_.send(std::move(taken_by));
   states_.resize(bricks.size());
   const cl::Buffer& chosen = has_chosen ? chosen_() : camera.depth()();  // a kernel takes no missing buffer
-  commands_.run(kStage, "take_points", cubes, commands_.device().heavy_group(), frame, limits_,
+  commands_.run(kStage, "take_points", taken_.cubes(bricks.size()), commands_.device().heavy_group(), frame, limits_,
                 views.own_view_from(window.T_camera_local()), views.depths(), camera.depth()(), static_cast<cl_int>(has_chosen), chosen,
                 taken_by_(), count, taken_.brick_words());
   commands_.run(kStage, "find_brick_states", count, kGroup, taken_by_(), count, taken_.brick_words(), states_());

@@ -5,7 +5,9 @@
 /// until a frame sees them again. So no view has to be changed, and what a view knows beyond stays known.
 #pragma once
 
+#include <array>
 #include <deque>
+#include <set>
 
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
@@ -47,11 +49,11 @@ class TakingBack {
 
   /// @name Of the last update() that found strong evidence at all, [height][width] of the working image
   /// @{
-  const DeviceArray<cl_uchar>& evidence() const { return evidence_; }  ///< NO_EVIDENCE, WEAK_EVIDENCE or STRONG_EVIDENCE
-  const DeviceArray<cl_uchar>& chosen() const {
-    return chosen_;
-  }  ///< 1: the pixel's surface took space back
-     /// @}
+  /// NO_EVIDENCE, WEAK_EVIDENCE or STRONG_EVIDENCE
+  const DeviceArray<cl_uchar>& evidence() const { return evidence_; }
+  /// 1: the pixel's surface took space back
+  const DeviceArray<cl_uchar>& chosen() const { return chosen_; }
+  /// @}
 
  private:
   struct LastFrame {
@@ -65,7 +67,11 @@ class TakingBack {
     cl_int4 place;  ///< x, y, z, counted in bricks from the window's corner, and its number
   };
 
-  bool any_taken(const MapWindow& window);
+  using Place = std::array<int, 3>;  ///< x, y, z, counted in bricks from the window's corner
+
+  std::vector<Brick> bricks_with_points(const MapWindow& window);
+  std::set<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
+                                const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
   bool find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
