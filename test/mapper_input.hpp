@@ -80,6 +80,12 @@ inline std::vector<Surfel> map_of(const Frames& frames, const Config& config) {
   return mapper.surfels();
 }
 
+/// Maps frames. @return them, with the poses with which they were mapped
+inline Frames mapped(Mapper& mapper, Frames frames) {
+  for (auto& frame : frames) frame.T_world_camera = mapper.integrate(frame.view()).T_world_camera;
+  return frames;
+}
+
 inline scoring::ExactScore score(const std::vector<Surfel>& surfels, const Frames& frames, const Config& config) {
   scoring::ExactTest exact(config);
   for (const auto& frame : frames) exact.add(frame.view());

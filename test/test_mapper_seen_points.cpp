@@ -8,6 +8,7 @@ namespace {
 Config few_views(int recent_views) {
   Config config = undecimated();
   config.recent_views = recent_views;
+  config.correct_poses = false;  // the last frames, by which poses are corrected, are not saved
   return config;
 }
 

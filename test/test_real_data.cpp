@@ -69,8 +69,10 @@ void expect_reached(const Config& base, const Reached& reached, double at_least)
     const Frames frames = spread_frames(folder, 40);
     ASSERT_GE(frames.size(), 30u) << folder;
     const Config config = config_for(frames, base);
-    const auto surfels = map_of(frames, config);
-    const auto s = score(surfels, frames, config);
+    Mapper mapper(config);
+    const Frames seen = mapped(mapper, frames);
+    const auto surfels = mapper.surfels();
+    const auto s = score(surfels, seen, config);
     const std::string name = folder.filename().string();
     SCOPED_TRACE(name + ": " + text(s, surfels.size()));
     EXPECT_TRUE(all_sound(surfels));

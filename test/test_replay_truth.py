@@ -92,9 +92,10 @@ class Judged(WithFolder):
             self.assertGreater(summary['truth']['miss_2cm'], summary['exact']['miss_2cm'])
 
     def test_the_exact_test_is_the_same_without_a_truth(self):
-        with_truth = self.summary(self.noisy, '--octomap-resolution', 0, truth=self.noisy)
+        as_recorded = ['--octomap-resolution', 0, '--set', 'correct_poses=false']
+        with_truth = self.summary(self.noisy, *as_recorded, truth=self.noisy)
         self.assertEqual(with_truth['truth'], with_truth['exact'], 'the recording itself is a truth')
-        result = run(self.noisy, '--report', self.report, '--set', 'decimation=1', '--octomap-resolution', 0)
+        result = run(self.noisy, '--report', self.report, '--set', 'decimation=1', *as_recorded)
         self.assertEqual(result.returncode, DONE, result.stderr)
         without = read_json(self.report)
         self.assertEqual(with_truth['exact'], without['exact'])

@@ -37,6 +37,7 @@ FrameRecord frame(int i) {
   record.report.stages = {{"sweeps", (i + 1) / 4.0}};
   if (i % 2 == 1) record.report.stages.push_back({"median", (i + 1) / 2.0});
   record.T_world_camera = Eigen::Isometry3d(Eigen::Translation3d(i, 0.1, -2) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
+  record.report.T_world_camera = record.T_world_camera * Eigen::Translation3d(0, 0, 0.001 * i);
   record.cpu_ms = 2 * (i + 1);
   record.depths.usable = record.depths.in_working_image = 1;
   record.octomap = scoring::InsertionTime{100.0 * (i + 1), 90.0 * (i + 1)};
@@ -81,7 +82,7 @@ std::unique_ptr<Yardsticks> yardsticks_of_a_frame(const OctomapResolution& octom
   frame.intrinsics = {500, 510, 4, 4, 8, 8};
   frame.T_world_camera = Eigen::Isometry3d::Identity();
   auto yardsticks = std::make_unique<Yardsticks>(Config(), octomap_resolution, true);
-  yardsticks->add(frame);
+  yardsticks->add(frame, frame.T_world_camera);
   return yardsticks;
 }
 
@@ -144,9 +145,11 @@ TEST(Summary, HasExactlyTheKeysOfTheInterface) {
   const auto yardsticks = yardsticks_of_a_frame(0.02);
   const ordered_json json = summary_json({"a/folder", {}}, run_of(12), *yardsticks, some_scores());
   EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
-                              "surfels", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
+                              "surfels", "pose_corrections", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
   EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "taken_back", "map_bytes", "seen_bytes"}));
+  EXPECT_EQ(keys(json["pose_corrections"]), (Keys{"shift_mm", "turn_deg"}));
+  EXPECT_EQ(keys(json["pose_corrections"]["shift_mm"]), (Keys{"median", "p95"}));
   EXPECT_EQ(keys(json["time_ms"]), (Keys{"mean", "median", "p95", "max", "rsd_percent", "stages"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]), (Keys{"sweeps", "median"}));
   EXPECT_EQ(keys(json["time_ms"]["stages"]["sweeps"]), (Keys{"mean", "median"}));
@@ -170,6 +173,10 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_EQ(json["surfels"]["occupied"], 3000);
   EXPECT_EQ(json["surfels"]["map_bytes"], 80000);
   EXPECT_EQ(json["surfels"]["seen_bytes"], 7000);
+  // Of frames 0, 1, ... 11, moved by as many mm
+  EXPECT_NEAR(json["pose_corrections"]["shift_mm"]["median"], 5.5, 1e-9);
+  EXPECT_NEAR(json["pose_corrections"]["shift_mm"]["p95"], 11, 1e-9);
+  EXPECT_NEAR(json["pose_corrections"]["turn_deg"]["p95"], 0, 1e-6);
   // Frames 6 to 12, of 6, 7, ... 12 ms
   EXPECT_DOUBLE_EQ(json["time_ms"]["mean"], 9);
   EXPECT_DOUBLE_EQ(json["time_ms"]["max"], 12);
@@ -188,6 +195,15 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_EQ(json["octomap"]["fp"], 50);
   EXPECT_DOUBLE_EQ(json["exact"]["right"], 0.94);
   EXPECT_DOUBLE_EQ(json["exact"]["miss_2cm"], 0.0005);
+}
+
+TEST(Summary, HasNoPoseCorrectionsIfThereAreNone) {
+  auto run = run_of(12);
+  run.config.correct_poses = false;
+  const Yardsticks none(Config(), 0, false);
+  const ordered_json json = summary_json({"a/folder", {}}, run, none, {});
+  EXPECT_FALSE(json.contains("pose_corrections"));
+  EXPECT_EQ(result_table(json).find("poses"), std::string::npos);
 }
 
 TEST(Summary, LeavesOutWhatWasNotMeasured) {
@@ -271,7 +287,7 @@ TEST(Trajectory, IsInTumsFormat) {
   EXPECT_DOUBLE_EQ(stamp, frame(1).report.stamp);
   EXPECT_DOUBLE_EQ(x, 1);
   EXPECT_DOUBLE_EQ(y, 0.1);
-  EXPECT_DOUBLE_EQ(z, -2);
+  EXPECT_DOUBLE_EQ(z, -1.999);  // as it was mapped
   EXPECT_NEAR(qz, std::sqrt(0.5), 1e-12);
   EXPECT_NEAR(qw, std::sqrt(0.5), 1e-12);
   EXPECT_NEAR(qx, 0, 1e-12);
@@ -323,9 +339,9 @@ TEST(Sweep, OtherDepthRangeOrPixelsNeedOtherYardsticks) {
   config = Config();
   config.decimation = 8;
   EXPECT_FALSE(yardsticks.fit(config));
-  for (bool Config::*carve : {&Config::carve_no_return, &Config::carve_beyond_range}) {
+  for (bool Config::*reading : {&Config::carve_no_return, &Config::carve_beyond_range, &Config::correct_poses}) {
     config = Config();
-    config.*carve = true;
+    config.*reading = !(config.*reading);
     EXPECT_FALSE(yardsticks.fit(config));
   }
 }

@@ -53,7 +53,7 @@ std::unique_ptr<Yardsticks> yardsticks_of_a_frame() {
   frame.intrinsics = {500, 510, 4, 4, 8, 8};
   frame.T_world_camera = Eigen::Isometry3d::Identity();
   auto yardsticks = std::make_unique<Yardsticks>(Config(), 0.02, true);
-  yardsticks->add(frame);
+  yardsticks->add(frame, frame.T_world_camera);
   return yardsticks;
 }
 

@@ -30,6 +30,9 @@ struct Config {
   double quantisation = 0.003;
   double agreement = 0.03;
 
+  // Poses (ours)
+  bool correct_poses = true;
+
   // Observed space (paper 3.3)
   bool carve_no_return = false;
   bool carve_beyond_range = false;
@@ -114,6 +117,13 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
                   "three standard deviations and a step",
                   0.001, 0.5},
         config.agreement);
+
+  group = "Poses";
+  field(
+      FieldInfo{
+          "correct_poses", "",
+          "whether jitter of the given poses from frame to frame is taken out, by aligning each frame with the last frames of its camera"},
+      config.correct_poses);
 
   group = "Observed space";
   field(FieldInfo{"carve_no_return", "", "whether a depth of +Inf means that space is free up to z_max"}, config.carve_no_return);

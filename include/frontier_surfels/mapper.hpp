@@ -75,7 +75,8 @@ class Mapper {
   std::vector<std::string> take_warnings();
 
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. With the same configuration, mapping goes on as with
-  /// the map that was saved. What has been seen is filled in from the surfels if the file does not have it; PCD files never do.
+  /// the map that was saved, except that the last frames, by which poses are corrected, are not saved. What has been seen is filled in from
+  /// the surfels if the file does not have it; PCD files never do.
   /// @throws FileError  the file cannot be used; the map stays as it was
   void load(const std::string& path);
 

@@ -145,12 +145,13 @@ struct StageTime {
 
 /// Result of integrate().
 struct Report {
-  double stamp = 0;                 ///< of the frame [s]
-  std::uint64_t sequence = 0;       ///< of the map after the frame; every frame, reset and load adds one
-  std::size_t surfels = 0;          ///< in the map after the frame
-  std::size_t in_view = 0;          ///< surfels that touched the view's grid
-  std::size_t measured_pixels = 0;  ///< of the working image: they measure a surface, or free space
-  std::size_t taken_back = 0;       ///< of these pixels: their surface stood in known space, and space behind it became unknown again
+  double stamp = 0;                                                  ///< of the frame [s]
+  std::uint64_t sequence = 0;                                        ///< of the map after the frame; every frame, reset and load adds one
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();  ///< pose with which the frame was mapped: Config::correct_poses
+  std::size_t surfels = 0;                                           ///< in the map after the frame
+  std::size_t in_view = 0;                                           ///< surfels that touched the view's grid
+  std::size_t measured_pixels = 0;                                   ///< of the working image: they measure a surface, or free space
+  std::size_t taken_back = 0;  ///< of these pixels: their surface stood in known space, and space behind it became unknown again
   std::size_t created = 0;
   std::size_t removed = 0;
   std::size_t split = 0;      ///< surfels added by splitting; surfels = surfels before + split + created - removed

@@ -130,6 +130,7 @@ void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels, const SeenSpace
   views.clear(map.size() == 0);
   seen.clear();
   taking_back.clear();
+  pose_correction.clear();
   if (config.seen_points) seen.load(has_seen);
   load_views(saved_views);
   map.set_lost(false);

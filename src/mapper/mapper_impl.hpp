@@ -10,6 +10,7 @@
 #include "config/checked.hpp"
 #include "frame/camera.hpp"
 #include "frame/limits.hpp"
+#include "frame/pose_correction.hpp"
 #include "frame/recent_views.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "map/change_readers.hpp"
@@ -39,6 +40,7 @@ struct Mapper::Impl {
         seen(commands, map.block_size()),
         views(commands, config),
         cameras(commands, config),
+        pose_correction(config),
         observed(commands),
         taking_back(commands, config, map.block_size()),
         candidates(commands),
@@ -67,7 +69,7 @@ struct Mapper::Impl {
   double seen_spacing(const Camera& camera) const;
   SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
-  void finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Report& report);
+  void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
@@ -84,6 +86,7 @@ struct Mapper::Impl {
   Cameras cameras;
 
   // The stages, in the order in which they run
+  PoseCorrection pose_correction;
   ObservedSpace observed;
   TakingBack taking_back;
   Candidates candidates;

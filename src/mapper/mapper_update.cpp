@@ -49,7 +49,11 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
-  Frame frame = begin_frame(image, input.T_world_camera, camera, number);
+
+  // Pose correction - ours: the jitter of the recorded poses is taken out
+  const CorrectedPose pose = pose_correction.correct(image, input.T_world_camera);
+  report.T_world_camera = pose.T_world_camera;
+  Frame frame = begin_frame(image, pose.T_world_camera, camera, number);
 
   // Observed space C~ - 3.3, eq. (9)-(11)
   observed.compute(frame, camera);
@@ -93,7 +97,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  finish_frame(number, image, input.T_world_camera, report);
+  finish_frame(number, image, pose, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
@@ -134,11 +138,12 @@ void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T
   if (!changed) frame_on_device = exact;
 }
 
-void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Report& report) {
+void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report) {
   map.finish_frame("labels", number);
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
-  taking_back.add_to_last_frames(image, T_world_camera, views.current_number());
+  taking_back.add_to_last_frames(image, pose.T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
+  pose_correction.add(image, pose);
   report.view_kept = views.keep_current();
   sequence = report.sequence;
   frame_on_device = pages_changed ? 0 : sequence;

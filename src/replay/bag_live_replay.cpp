@@ -42,6 +42,7 @@ Report to_report(const FrameReport& message) {
   Report report;
   report.stamp = message.header.stamp.toSec();
   report.sequence = message.sequence;
+  report.T_world_camera = messages::to_isometry(message.pose);
   report.surfels = message.surfels;
   report.in_view = message.in_view;
   report.measured_pixels = message.measured_pixels;
@@ -79,7 +80,7 @@ void add(Run& run, const RecordedFrame& frame, const FrameReport& report, Yardst
   FrameRecord record{to_report(report), frame.T_world_camera, std::nullopt};
   record.depths = count_depths(frame.view().depth, run.config, record.report.measured_pixels);
   record.index = frame.index;
-  if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view(), frame.index);
+  if (yardsticks != nullptr) record.octomap = yardsticks->add(frame.view(), record.report.T_world_camera, frame.index);
   run.frames.push_back(std::move(record));
 }
 

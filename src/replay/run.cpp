@@ -21,14 +21,16 @@ Yardsticks::Yardsticks(const Config& config, const OctomapResolution& octomap_re
   if (truth) truth_.emplace(config, std::move(truth));
 }
 
-std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame, std::size_t index,
+std::optional<scoring::InsertionTime> Yardsticks::add(const DepthFrame& frame, const Eigen::Isometry3d& T_world_camera, std::size_t index,
                                                       const scoring::ObjectTest::SurfelsIn& surfels_in) {
+  DepthFrame mapped = frame;
+  mapped.T_world_camera = T_world_camera;
   if (pixel_spacing_ == 0) pixel_spacing_ = config_.decimation * config_.z_max / std::min(frame.intrinsics.fx, frame.intrinsics.fy);
-  if (exact_) exact_->add(frame);
+  if (exact_) exact_->add(mapped);
   if (truth_) truth_->add(index, frame, surfels_in);
   if (octomap_resolution() == 0) return std::nullopt;
   if (!octomap_) octomap_.emplace(octomap_resolution(), config_);
-  return octomap_->add(frame);
+  return octomap_->add(mapped);
 }
 
 const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
@@ -36,7 +38,10 @@ const std::vector<Surfel>& Yardsticks::octomap_boundary() const {
   return *octomap_boundary_;
 }
 
-bool Yardsticks::fit(const Config& config) const { return scoring::DepthReading(config) == scoring::DepthReading(config_); }
+/// Corrected poses follow from the working images, and from the sensor's noise.
+bool Yardsticks::fit(const Config& config) const {
+  return scoring::DepthReading(config) == scoring::DepthReading(config_) && config.correct_poses == config_.correct_poses;
+}
 
 Run new_run(const FrameSource& source, const Config& config, const std::string& device) {
   Run run;
@@ -99,7 +104,7 @@ Run map_recording(const Recording& recording, const Config& config, Yardsticks* 
   }
   const auto surfels_in = [&mapper](const Eigen::AlignedBox3d& box) { return mapper.surfels(box.cast<float>()); };
   const auto measure = [&](const DepthFrame& view, FrameRecord& record) {
-    if (yardsticks != nullptr) record.octomap = yardsticks->add(view, record.index, surfels_in);
+    if (yardsticks != nullptr) record.octomap = yardsticks->add(view, record.report.T_world_camera, record.index, surfels_in);
   };
   Run run = map_frames(mapper, *source, measure, stop);
   if (run.frames.empty() && !run.unsaved.empty()) throw FileError(run.unsaved);

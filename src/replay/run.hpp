@@ -33,11 +33,12 @@ class Yardsticks {
   /// @param truth  null: none
   Yardsticks(const Config& config, const OctomapResolution& octomap_resolution, bool exact, std::shared_ptr<TruthFolder> truth = nullptr);
 
-  /// @param index       of the frame in the recording
-  /// @param surfels_in  the map after the frame, for the truth's objects; may be empty
+  /// @param T_world_camera  the pose with which the mapper has mapped the frame
+  /// @param index           of the frame in the recording
+  /// @param surfels_in      the map after the frame, for the truth's objects; may be empty
   /// @return the time of OctoMap for this frame, if there is an OctoMap
   /// @throws Error  the truth has no such frame
-  std::optional<scoring::InsertionTime> add(const DepthFrame& frame, std::size_t index = 0,
+  std::optional<scoring::InsertionTime> add(const DepthFrame& frame, const Eigen::Isometry3d& T_world_camera, std::size_t index = 0,
                                             const scoring::ObjectTest::SurfelsIn& surfels_in = {});
 
   const std::optional<scoring::ExactTest>& exact() const { return exact_; }
@@ -66,7 +67,7 @@ class Yardsticks {
 
 struct FrameRecord {
   Report report;
-  Eigen::Isometry3d T_world_camera;
+  Eigen::Isometry3d T_world_camera;  ///< as it was recorded
   std::optional<scoring::InsertionTime> octomap;
   DepthCensus depths = {};
   double cpu_ms = 0;      ///< CPU time of the whole process during integrate(), a CPU device's threads included; 0: not measured

@@ -59,6 +59,21 @@ std::size_t taken_back(const std::vector<FrameRecord>& frames) {
   return pixels;
 }
 
+double shift_mm(const FrameRecord& frame) {
+  return 1000 * (frame.report.T_world_camera.translation() - frame.T_world_camera.translation()).norm();
+}
+
+double turn_deg(const FrameRecord& frame) {
+  const Eigen::Quaterniond recorded(frame.T_world_camera.linear()), mapped(frame.report.T_world_camera.linear());
+  return recorded.angularDistance(mapped) * 180 / M_PI;
+}
+
+/// How far the poses of the map are from the recorded ones.
+ordered_json corrections_json(const std::vector<FrameRecord>& frames) {
+  const TimeStatistics shift = time_statistics(column(frames, shift_mm)), turn = time_statistics(column(frames, turn_deg));
+  return {{"shift_mm", {{"median", shift.median}, {"p95", shift.p95}}}, {"turn_deg", {{"median", turn.median}, {"p95", turn.p95}}}};
+}
+
 bool cpu_is_measured(const std::vector<FrameRecord>& frames) {
   return std::all_of(frames.begin(), frames.end(), [](const FrameRecord& frame) { return frame.cpu_ms > 0; });
 }
@@ -159,6 +174,7 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
   json["surfels"] = {{"total", run.statistics.surfels},       {"occupied", run.statistics.occupied},
                      {"frontier", run.statistics.frontier},   {"taken_back", taken_back(run.frames)},
                      {"map_bytes", run.statistics.map_bytes}, {"seen_bytes", run.statistics.seen_bytes}};
+  if (run.config.correct_poses) json["pose_corrections"] = corrections_json(run.frames);
   json["time_ms"] = time_json(warm, stage_names(run.frames));
   if (cpu_is_measured(warm)) json["cpu_ms"] = mean_and_median(column(warm, cpu_ms));
   json["memory_mb"] = {{"peak_rss", run.peak_rss_mb}, {"device", run.statistics.device_bytes / 1e6}};
@@ -208,8 +224,8 @@ std::string trajectory_text(const std::vector<FrameRecord>& frames) {
   std::string text = "# stamp tx ty tz qx qy qz qw (camera to world, optical frame)\n";
   for (const FrameRecord& frame : frames) {
     text += exact_text(frame.report.stamp);
-    const Eigen::Quaterniond q(frame.T_world_camera.linear());
-    const Eigen::Vector3d p = frame.T_world_camera.translation();
+    const Eigen::Quaterniond q(frame.report.T_world_camera.linear());
+    const Eigen::Vector3d p = frame.report.T_world_camera.translation();
     for (const double value : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) text += " " + exact_text(value);
     text += "\n";
   }
@@ -233,6 +249,11 @@ std::string result_table(const ordered_json& summary) {
                      surfels["frontier"], surfels["map_bytes"].get<double>() / 1e6);
   if (surfels["taken_back"] > 0)
     table += formatted("taken back  by %.0f pixels, whose surface stood where space was seen to be free before\n", surfels["taken_back"]);
+  if (summary.contains("pose_corrections")) {
+    const auto &shift = summary["pose_corrections"]["shift_mm"], &turn = summary["pose_corrections"]["turn_deg"];
+    table += formatted("poses       corrected by %.1f mm and %.2f degrees, 95 %% by less than %.1f mm and %.2f degrees\n", shift["median"],
+                       turn["median"], shift["p95"], turn["p95"]);
+  }
   table +=
       formatted("time        median %.1f ms a frame, 95 %% below %.1f ms, at most %.1f ms\n", time["median"], time["p95"], time["max"]);
   const auto percent = [](const ordered_json& share) { return 100 * share.get<double>(); };

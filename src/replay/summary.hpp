@@ -33,16 +33,17 @@ nlohmann::ordered_json config_json(const Config& config);
 nlohmann::ordered_json octomap_json(const scoring::OctomapScore& score);
 nlohmann::ordered_json exact_json(const scoring::ExactScore& score);
 
-/// The content of summary.json. `octomap`, `exact`, `truth` and `objects` are absent if there are no such scores, and `cpu_ms` if the
-/// mapper ran in another process. `warnings` are those of warnings(), `reasons` tells how many frames added nothing for each reason,
-/// `notes` are those of the source, and `skipped` has a sentence for each skipped frame.
+/// The content of summary.json. `octomap`, `exact`, `truth` and `objects` are absent if there are no such scores, `cpu_ms` if the mapper
+/// ran in another process, and `pose_corrections` if there are none. `warnings` are those of warnings(), `reasons` tells how many frames
+/// added nothing for each reason, `notes` are those of the source, and `skipped` has a sentence for each skipped frame.
 nlohmann::ordered_json summary_json(const Recording& recording, const Run& run, const Yardsticks& yardsticks, const Scores& scores);
 
 /// The content of frames.csv: a line for each frame, with numbers that are read back exactly. The column octomap_ms is absent without an
 /// OctoMap. The last column is the reason why a frame adds nothing to the map, see reason(); it is empty for most frames.
 std::string frames_csv(const std::vector<FrameRecord>& frames);
 
-/// The poses in the format of TUM RGB-D, a line for each frame: stamp tx ty tz qx qy qz qw, camera to world.
+/// The poses with which the frames were mapped, in the format of TUM RGB-D, a line for each frame: stamp tx ty tz qx qy qz qw, camera to
+/// world.
 std::string trajectory_text(const std::vector<FrameRecord>& frames);
 
 /// The error for a recording whose frames were mapped, but left the map empty. @param warnings  about the run

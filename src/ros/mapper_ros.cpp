@@ -247,7 +247,7 @@ FrameReport MapperRos::Impl::integrate(CameraInput& camera, const CompleteImage&
   const Report report = mapper_.integrate(frame);
   surfels_ = static_cast<std::uint32_t>(report.surfels);
   sequence_ = report.sequence;
-  state_ = {header.stamp, CameraView{frame.T_world_camera, frame.intrinsics, config_.mapper.z_max}};
+  state_ = {header.stamp, CameraView{report.T_world_camera, frame.intrinsics, config_.mapper.z_max}};
 
   FrameReport message = messages::to_message(report);
   message.header = header;

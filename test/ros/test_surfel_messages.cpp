@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "mapper_input.hpp"
+#include "ros/input/conversions.hpp"
 #include "ros/output/serialized.hpp"
 #include "ros/output/surfel_messages.hpp"
 #include "ros/surfel_input.hpp"
@@ -315,6 +316,7 @@ TEST(FrameReports, SayWhatTheMapperSays) {
   report.removed = 4;
   report.split = 5;
   report.view_kept = true;
+  report.T_world_camera = Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -2) / 3);
   report.total_ms = 6.5;
   report.stages = {{"first", 1.5}, {"second", 2.5}};
   const FrameReport message = to_message(report);
@@ -326,6 +328,7 @@ TEST(FrameReports, SayWhatTheMapperSays) {
   EXPECT_EQ(message.removed, 4U);
   EXPECT_EQ(message.split, 5U);
   EXPECT_TRUE(message.view_kept);
+  EXPECT_TRUE(to_isometry(message.pose).isApprox(report.T_world_camera, 1e-12));
   EXPECT_EQ(message.total_ms, 6.5);
   EXPECT_EQ(message.stage_names, (std::vector<std::string>{"first", "second"}));
   EXPECT_EQ(message.stage_ms, (std::vector<double>{1.5, 2.5}));

@@ -234,6 +234,15 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
   return Eigen::Translation3d(translation) * rotation.normalized();
 }
 
+Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose) {
+  geometry_msgs::Transform transform;
+  transform.translation.x = pose.position.x;
+  transform.translation.y = pose.position.y;
+  transform.translation.z = pose.position.z;
+  transform.rotation = pose.orientation;
+  return to_isometry(transform);
+}
+
 std::string late_stamp(const ros::Time& stamp) { return "its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038"; }
 
 std::string strip_slash(const std::string& name) {

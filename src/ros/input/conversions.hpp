@@ -1,6 +1,7 @@
 /// Images, cameras and poses of ROS messages as the types of this library.
 #pragma once
 
+#include <geometry_msgs/Pose.h>
 #include <geometry_msgs/Transform.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -62,6 +63,7 @@ Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& im
 
 /// A rigid transform; the quaternion is normalised. @throws BadFrame if it is not finite, or the quaternion is 0
 Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
+Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose);
 
 /// Largest difference of stamps between a depth image and the colour image that belongs to it [s].
 constexpr double kColorTolerance = 0.030;

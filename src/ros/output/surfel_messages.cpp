@@ -157,6 +157,19 @@ std::uint32_t count32(std::size_t count) {
   return static_cast<std::uint32_t>(std::min<std::size_t>(count, std::numeric_limits<std::uint32_t>::max()));
 }
 
+geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond rotation(T.linear());
+  geometry_msgs::Pose pose;
+  pose.position.x = T.translation().x();
+  pose.position.y = T.translation().y();
+  pose.position.z = T.translation().z();
+  pose.orientation.x = rotation.x();
+  pose.orientation.y = rotation.y();
+  pose.orientation.z = rotation.z();
+  pose.orientation.w = rotation.w();
+  return pose;
+}
+
 }  // namespace
 
 PointCloud2 to_cloud(const std::vector<Surfel>& surfels, Label confident, std::size_t most) {
@@ -251,6 +264,7 @@ SurfelUpdate UpdateMessages::next() {
 FrameReport to_message(const Report& report) {
   FrameReport message;
   message.sequence = report.sequence;
+  message.pose = to_pose(report.T_world_camera);
   message.surfels = count32(report.surfels);
   message.in_view = count32(report.in_view);
   message.measured_pixels = count32(report.measured_pixels);
