@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "frame/depth_pixels.hpp"
-#include "frame/row_bands.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -32,43 +31,54 @@ float interpret(float d, const Config& config) {
   return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
 }
 
-DepthPlanes::DepthPlanes(const DepthImage& image, const Config& config, int margin)
-    : decimation_(config.decimation), margin_(margin), stride_((image.width + decimation_ - 1) / decimation_ + 2) {
-  depth_.assign(static_cast<std::size_t>(image.height + 2 * margin_) * decimation_ * stride_, 0.0F);
-  in_row_bands(image.height, config.threads, [&](int first, int last) {
-    if (image.encoding == DepthImage::Encoding::kStepsU16)
-      read<std::uint16_t>(image, config, first, last);
-    else
-      read<std::uint32_t>(image, config, first, last);
-  });
-}
+DepthRows::DepthRows(const DepthImage& image, const Config& config, int margin)
+    : image_(image),
+      depth_unit_(config.depth_unit),
+      no_return_(config.carve_no_return ? std::numeric_limits<float>::infinity() : 0),
+      far_(static_cast<float>(2 * config.z_max)),
+      decimation_(config.decimation),
+      margin_(margin),
+      rows_(2 * margin + 1),
+      stride_((image.width + decimation_ - 1) / decimation_ + 2),
+      next_(-margin),
+      of_row_(image.width),
+      depth_(static_cast<std::size_t>(rows_) * decimation_ * stride_) {}
 
-/// All depths far beyond z_max are alike.
-template <typename Pixel>
-void DepthPlanes::read(const DepthImage& image, const Config& config, int first_row, int last_row) {
-  const float infinity = std::numeric_limits<float>::infinity(), no_return = config.carve_no_return ? infinity : 0,
-              far = static_cast<float>(2 * config.z_max);
-  std::vector<float> of_row(image.width);
-  for (int row = first_row; row < last_row; ++row) {
-    const auto* pixels = static_cast<const std::uint8_t*>(image.data) + row * image.step;
-    for (int column = 0; column < image.width; ++column) {
-      const float raw = to_metres(pixel_at<Pixel>(pixels + column * sizeof(Pixel), image.swap_bytes), config.depth_unit),
-                  finite = std::min(raw, far);
-      of_row[column] = raw > 0 ? (raw == infinity ? no_return : finite) : 0;
-    }
-    for (int first = 0; first < decimation_; ++first) {
-      float* to = &depth_[(static_cast<std::size_t>(row + margin_) * decimation_ + first) * stride_ + 1];
-      for (int column = first; column < image.width; column += decimation_) *to++ = of_row[column];
-    }
+void DepthRows::move_to(int t) {
+  const int middle = decimation_ * t;
+  for (next_ = std::max(next_, middle - margin_); next_ <= middle + margin_; ++next_) {
+    float* planes = planes_of(next_);
+    if (next_ < 0 || next_ >= image_.height)
+      std::fill(planes, planes + static_cast<std::ptrdiff_t>(decimation_) * stride_, 0.0F);
+    else if (image_.encoding == DepthImage::Encoding::kStepsU16)
+      read<std::uint16_t>(next_, planes);
+    else
+      read<std::uint32_t>(next_, planes);
   }
 }
 
-const float* DepthPlanes::every(int column, int row) const {
-  const int plane = (column + decimation_) % decimation_, first = column < 0 ? 0 : 1;
-  return &depth_[(static_cast<std::size_t>(row + margin_) * decimation_ + plane) * stride_ + first];
+/// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are.
+template <typename Pixel>
+void DepthRows::read(int row, float* planes) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const auto* pixels = static_cast<const std::uint8_t*>(image_.data) + row * image_.step;
+  for (int column = 0; column < image_.width; ++column) {
+    const float raw = to_metres(pixel_at<Pixel>(pixels + column * sizeof(Pixel), image_.swap_bytes), depth_unit_),
+                finite = std::min(raw, far_);
+    of_row_[column] = raw > 0 ? (raw == kInfinity ? no_return_ : finite) : 0;
+  }
+  for (int first = 0; first < decimation_; ++first) {
+    float* to = &planes[first * stride_ + 1];
+    for (int column = first; column < image_.width; column += decimation_) *to++ = of_row_[column];
+  }
 }
 
-float DepthPlanes::at(int column, int row) const {
+const float* DepthRows::every(int column, int row) const {
+  const int plane = (column + decimation_) % decimation_, first = column < 0 ? 0 : 1;
+  return &depth_[(static_cast<std::size_t>((row + margin_) % rows_) * decimation_ + plane) * stride_ + first];
+}
+
+float DepthRows::at(int column, int row) const {
   return column < 0 ? *every(column, row) : every(column % decimation_, row)[column / decimation_];
 }
 
@@ -83,29 +93,32 @@ Sampling::Sampling(const Config& config)
 float Sampling::tolerance(float depth) const { return std::max(agreement_ * depth, constant_ + growth_ * depth * depth); }
 float Sampling::lowest(float pivot) const { return std::max(pivot - tolerance(pivot), std::numeric_limits<float>::min()); }
 
-/// Of each block of a row: limits of the depths that agree, their sum and their number, and the numbers of the other pixels.
-struct Sampling::Row {
-  explicit Row(int width) : lowest(width), highest(width), sum(width), agree(width), nearer(width), farther(width) {}
-  std::vector<float> lowest, highest, sum;
-  std::vector<int> agree, nearer, farther;
-};
+BandSampler::BandSampler(const Sampling& sampling, const DepthImage& image, int width)
+    : sampling_(sampling),
+      rows_(image, sampling.config_, sampling.radius_),
+      lowest_(width),
+      highest_(width),
+      sum_(width),
+      agree_(width),
+      nearer_(width),
+      farther_(width) {}
 
 /// With the middle pixels as pivots. The loop over the blocks of the row is the inner one, so that the compiler makes vectors of it.
-void Sampling::sample_row(const DepthPlanes& planes, int t, Row& row) const {
-  const int width = static_cast<int>(row.sum.size());
-  const float* pivots = planes.every(0, config_.decimation * t);
+void BandSampler::count(int t) {
+  const int width = static_cast<int>(sum_.size()), radius = sampling_.radius_, row = sampling_.config_.decimation * t;
+  const float* pivots = rows_.every(0, row);
   for (int s = 0; s < width; ++s) {
-    row.lowest[s] = lowest(pivots[s]);
-    row.highest[s] = highest(pivots[s]);
-    row.sum[s] = 0;
-    row.agree[s] = row.nearer[s] = row.farther[s] = 0;
+    lowest_[s] = sampling_.lowest(pivots[s]);
+    highest_[s] = sampling_.highest(pivots[s]);
+    sum_[s] = 0;
+    agree_[s] = nearer_[s] = farther_[s] = 0;
   }
-  const float *low = row.lowest.data(), *high = row.highest.data();
-  float* __restrict__ sum = row.sum.data();
-  int* __restrict__ agree = row.agree.data(), * __restrict__ nearer = row.nearer.data(), * __restrict__ farther = row.farther.data();
-  for (int dy = -radius_; dy <= radius_; ++dy)
-    for (int dx = -radius_; dx <= radius_; ++dx) {
-      const float* depth = planes.every(dx, config_.decimation * t + dy);
+  const float *low = lowest_.data(), *high = highest_.data();
+  float* __restrict__ sum = sum_.data();
+  int* __restrict__ agree = agree_.data(), * __restrict__ nearer = nearer_.data(), * __restrict__ farther = farther_.data();
+  for (int dy = -radius; dy <= radius; ++dy)
+    for (int dx = -radius; dx <= radius; ++dx) {
+      const float* depth = rows_.every(dx, row + dy);
       for (int s = 0; s < width; ++s) {
         const float d = depth[s];
         const int is_near = d < low[s] ? 1 : 0, is_far = d > high[s] ? 1 : 0, measured = d > 0 ? 1 : 0;
@@ -118,43 +131,31 @@ void Sampling::sample_row(const DepthPlanes& planes, int t, Row& row) const {
     }
 }
 
-SampledDepth Sampling::sample(const DepthPlanes& planes, int width, int height) const {
-  const std::size_t count = static_cast<std::size_t>(width) * height;
-  std::vector<float> means(count);
-  SampledDepth sampled = {{}, std::vector<float>(count), std::vector<std::uint8_t>(count)};
-  in_row_bands(height, config_.threads, [&](int first, int last) { sample_rows(planes, width, first, last, means.data(), sampled); });
-  sampled.depth = in_range(means, width, height);
-  return sampled;
-}
-
-/// Rows first ... last - 1 of the working image. @param means  of all rows, before in_range()
-void Sampling::sample_rows(const DepthPlanes& planes, int width, int first, int last, float* means, SampledDepth& sampled) const {
-  const int edge = 2 * radius_ + 1;
-  Row row(width);
-  for (int t = first; t < last; ++t) {
-    sample_row(planes, t, row);
-    const float* middle = planes.every(0, config_.decimation * t);
-    for (int s = 0; s < width; ++s) {
-      const std::size_t n = static_cast<std::size_t>(t) * width + s;
-      const int agree = row.agree[s], nearer = row.nearer[s], farther = row.farther[s];
-      float pivot = middle[s], mean = row.sum[s] / static_cast<float>(std::max(agree, 1));
-      if (std::isinf(pivot)) {
-        mean = has_no_return(planes, s, t) ? pivot : 0;
-      } else if (agree < least_ || (nearer > agree && farther > agree)) {
-        mean = agree + nearer + farther < least_ ? 0 : fill(planes, s, t, &pivot);
-      }
-      means[n] = mean;
-      sampled.whole[n] = agree == edge * edge ? 1 : 0;
-      sampled.pivots[n] = mean > 0 && std::isfinite(mean) ? pivot : 0;
+void BandSampler::sample_row(int t, SampledDepth& sampled) {
+  rows_.move_to(t);
+  count(t);
+  const int width = static_cast<int>(sum_.size()), edge = 2 * sampling_.radius_ + 1, least = sampling_.least_;
+  const float* middle = rows_.every(0, sampling_.config_.decimation * t);
+  for (int s = 0; s < width; ++s) {
+    const std::size_t n = static_cast<std::size_t>(t) * width + s;
+    const int agree = agree_[s], nearer = nearer_[s], farther = farther_[s];
+    float pivot = middle[s], mean = sum_[s] / static_cast<float>(std::max(agree, 1));
+    if (std::isinf(pivot)) {
+      mean = sampling_.has_no_return(rows_, s, t) ? pivot : 0;
+    } else if (agree < least || (nearer > agree && farther > agree)) {
+      mean = agree + nearer + farther < least ? 0 : sampling_.fill(rows_, s, t, &pivot);
     }
+    sampled.means[n] = mean;
+    sampled.whole[n] = agree == edge * edge ? 1 : 0;
+    sampled.pivots[n] = mean > 0 && std::isfinite(mean) ? pivot : 0;
   }
 }
 
 /// For a block whose middle pixel is lost, or measures what few others do. @return 0: no measurement
-float Sampling::fill(const DepthPlanes& planes, int s, int t, float* pivot) const {
+float Sampling::fill(const DepthRows& rows, int s, int t, float* pivot) const {
   int nearest = std::numeric_limits<int>::max();
   *pivot = 0;
-  for_each_pixel_of(planes, s, t, [&](float depth, int dx, int dy) {
+  for_each_pixel_of(rows, s, t, [&](float depth, int dx, int dy) {
     const int distance = dx * dx + dy * dy;
     if (depth == 0 || distance == 0 || distance >= nearest) return;
     *pivot = depth;
@@ -165,7 +166,7 @@ float Sampling::fill(const DepthPlanes& planes, int s, int t, float* pivot) cons
   float sum = 0;
   int agree = 0, others = 0;
   unsigned sides = 0;
-  for_each_pixel_of(planes, s, t, [&](float depth, int dx, int dy) {
+  for_each_pixel_of(rows, s, t, [&](float depth, int dx, int dy) {
     if (depth == 0) return;
     if (depth < low || depth > high) {
       ++others;
@@ -178,9 +179,9 @@ float Sampling::fill(const DepthPlanes& planes, int s, int t, float* pivot) cons
   return agree >= least_ && agree >= kMostOthers * others && sides == kAllSides ? sum / static_cast<float>(agree) : 0;
 }
 
-bool Sampling::has_no_return(const DepthPlanes& planes, int s, int t) const {
+bool Sampling::has_no_return(const DepthRows& rows, int s, int t) const {
   int count = 0;
-  for_each_pixel_of(planes, s, t, [&](float depth, int, int) { count += std::isinf(depth) ? 1 : 0; });
+  for_each_pixel_of(rows, s, t, [&](float depth, int, int) { count += std::isinf(depth) ? 1 : 0; });
   return count >= least_;
 }
 

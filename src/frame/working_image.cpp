@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -91,18 +92,36 @@ void add(Rgb& sum, const Rgb& rgb) { std::transform(sum.begin(), sum.end(), rgb.
 
 std::uint32_t packed(const Rgb& rgb) { return rgb[0] | rgb[1] << 8 | rgb[2] << 16; }
 
-std::uint32_t packed_mean(const Rgb& sum, int pixels) {
-  const auto count = static_cast<std::uint32_t>(pixels);
-  const auto mean = [&](int channel) { return (sum[channel] + count / 2) / count; };
-  return packed({mean(0), mean(1), mean(2)});
+/// Divides by a number of pixels of a block, by a multiplication: a processor's division takes ten times as long.
+class Divisor {
+ public:
+  explicit Divisor(int pixels) : count_(static_cast<std::uint32_t>(pixels)), factor_((std::uint64_t{1} << kBits) / count_ + 1) {}
+
+  /// sum / pixels, rounded. Exact for sums of bytes: the quotient is too large by less than sum / 2^40, which is less than 1 / pixels.
+  std::uint32_t mean(std::uint32_t sum) const { return static_cast<std::uint32_t>((sum + count_ / 2) * factor_ >> kBits); }
+
+ private:
+  static constexpr int kBits = 40;
+  std::uint32_t count_;
+  std::uint64_t factor_;
+};
+
+std::uint32_t packed_mean(const Rgb& sum, const Divisor& pixels) {
+  return packed({pixels.mean(sum[0]), pixels.mean(sum[1]), pixels.mean(sum[2])});
 }
 
 /// Colours of blocks: the mean of the pixels that measure the block's surface.
 class MeanColors {
  public:
-  MeanColors(const ColorImage& color, const DepthPlanes& planes, const Sampling& sampling, const Config& config)
-      : color_(color), planes_(planes), sampling_(sampling), decimation_(config.decimation), of_columns_(color.width * color.channels) {}
+  MeanColors(const ColorImage& color, const DepthRows& rows, const Sampling& sampling, const Config& config)
+      : color_(color),
+        rows_(rows),
+        sampling_(sampling),
+        decimation_(config.decimation),
+        whole_block_((2 * sampling.radius() + 1) * (2 * sampling.radius() + 1)),
+        of_columns_(color.width * color.channels) {}
 
+  /// @param t       row of the blocks, of which `rows` has the pixels
   /// @param colors  of the row
   void fill_row(int t, const SampledDepth& sampled, std::uint32_t* colors, int width) {
     const int row = decimation_ * t, radius = sampling_.radius();
@@ -123,11 +142,11 @@ class MeanColors {
   }
 
   std::uint32_t of_whole_block(int column) const {
-    const int radius = sampling_.radius(), edge = 2 * radius + 1;
+    const int radius = sampling_.radius();
     Rgb sum = {0, 0, 0};
     for (int n = column - radius; n <= column + radius; ++n)
       add(sum, read_rgb(&of_columns_[static_cast<std::size_t>(n) * color_.channels], color_.order));
-    return packed_mean(sum, edge * edge);
+    return packed_mean(sum, whole_block_);
   }
 
   /// The middle pixel's if nothing was measured.
@@ -137,18 +156,19 @@ class MeanColors {
     const float lowest = sampling_.lowest(pivot), highest = sampling_.highest(pivot);
     Rgb sum = {0, 0, 0};
     int count = 0;
-    sampling_.for_each_pixel_of(planes_, s, t, [&](float depth, int dx, int dy) {
+    sampling_.for_each_pixel_of(rows_, s, t, [&](float depth, int dx, int dy) {
       if (depth < lowest || depth > highest) return;
       add(sum, read_color(color_, column + dx, row + dy));
       ++count;
     });
-    return packed_mean(sum, count);
+    return packed_mean(sum, Divisor(count));
   }
 
   const ColorImage& color_;
-  const DepthPlanes& planes_;
+  const DepthRows& rows_;
   const Sampling& sampling_;
   int decimation_;
+  Divisor whole_block_;                    ///< number of its pixels
   std::vector<std::uint16_t> of_columns_;  ///< sums of the bytes of a block's rows, at most 65 of them
 };
 
@@ -163,17 +183,20 @@ void sample_nearest(const DepthFrame& frame, const Config& config, WorkingImage&
 }
 
 void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& image) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
   const Sampling sampling(config);
-  const DepthPlanes planes = sampling.planes(frame.depth);
-  SampledDepth sampled = sampling.sample(planes, image.intrinsics.width, image.intrinsics.height);
-  image.depth = std::move(sampled.depth);
-  if (!frame.color) return;
-  image.color.resize(image.depth.size());
-  const int width = image.intrinsics.width;
-  in_row_bands(image.intrinsics.height, config.threads, [&](int first, int last) {
-    MeanColors colors(*frame.color, planes, sampling, config);
-    for (int t = first; t < last; ++t) colors.fill_row(t, sampled, &image.color[static_cast<std::size_t>(t) * width], width);
+  SampledDepth sampled(static_cast<std::size_t>(width) * height);
+  if (frame.color) image.color.resize(sampled.means.size());
+  in_row_bands(height, config.threads, [&](int first, int last) {
+    BandSampler band(sampling, frame.depth, width);
+    std::optional<MeanColors> colors;
+    if (frame.color) colors.emplace(*frame.color, band.rows(), sampling, config);
+    for (int t = first; t < last; ++t) {
+      band.sample_row(t, sampled);
+      if (colors) colors->fill_row(t, sampled, &image.color[static_cast<std::size_t>(t) * width], width);
+    }
   });
+  image.depth = sampling.in_range(sampled.means, width, height);
 }
 
 }  // namespace
