@@ -9,8 +9,10 @@ namespace {
 using Eigen::Vector3d;
 
 void expect_score(const Frames& frames, const Config& config, const Errors& reached) {
-  const std::vector<Surfel> surfels = map_of(frames, config);
-  const auto s = score(surfels, frames, config);
+  Mapper mapper(config);
+  const Frames as_mapped = mapped(mapper, frames);
+  const std::vector<Surfel> surfels = mapper.surfels();
+  const auto s = score(surfels, as_mapped, config);
   SCOPED_TRACE(text(s, surfels.size()));
   EXPECT_TRUE(all_sound(surfels));
   expect_errors(s, reached);
