@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/planner/states.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -40,6 +41,17 @@ class Mapper {
 
   /// The surfels of surfels() whose centre lies in a box of the world frame [m].
   std::vector<Surfel> surfels(const Eigen::AlignedBox3f& box_world) const;
+
+  /// What the map says of points of the world [m], in their order. What kept views and seen points know is free, except where it was taken
+  /// back; points within a voxel of an occupied surfel are occupied, and all others unknown. With a map_folder: by what is in memory. If
+  /// seen_points is false, only what kept views know is free.
+  /// @throws Error  a point is not finite
+  std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world) const;
+
+  /// Where rays end: at the first of their points that is occupied, or unknown if that is asked for. Both ends count. Points of a ray are
+  /// `step` [m] apart, or a little less.
+  /// @throws Error  an end is not finite, a ray has more than a million points, or the step is not from 0.0001 to 10 m
+  std::vector<RayState> ray_states(const std::vector<Ray>& rays_world, bool stop_at_unknown, double step = 0.01) const;
 
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;

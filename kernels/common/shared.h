@@ -143,12 +143,23 @@ namespace frontier_surfels {
 #define TAKE_SQUARE 7
 #define TAKE_GROWTH 5
 
+// States of points, for planners - ours: a block has STATE_CELLS cells along an edge, and cells come in cubes of STATE_CUBE; a work item
+// handles up to STATE_CHUNK points of a cube.
+#define STATE_CELLS 8
+#define STATE_CUBE 4
+#define STATE_CHUNK 64
+
 // Names of numbers -----------------------------------------------------------------------------------------------------------------------
 
 // Evidence that a measured surface stands in known space.
 #define NO_EVIDENCE 0
 #define WEAK_EVIDENCE 1
 #define STRONG_EVIDENCE 2
+
+// States of points: SpaceState.
+#define SPACE_UNKNOWN 0
+#define SPACE_FREE 1
+#define SPACE_OCCUPIED 2
 
 // Numbers of surfels that kernels count as they go.
 #define COUNT_IN_VIEW 0

@@ -192,15 +192,15 @@ std::vector<View> RecentViews::views_before(std::uint64_t number) const {
   return views;
 }
 
-int RecentViews::prepare() {
+int RecentViews::prepare(const Eigen::Isometry3d& T_world_frame) {
   std::vector<View> views;
   std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * VIEW_GROUP, 0.0F);
   for (const std::size_t number : spread(kept_.size())) {
     const Kept& kept = kept_[number];
-    const Eigen::Isometry3d T_view_camera = kept.T_world_camera.inverse() * current_.T_world_camera;
+    const Eigen::Isometry3d T_view_frame = kept.T_world_camera.inverse() * T_world_frame;
     const std::size_t n = views.size();
-    views.push_back(to_view(kept, T_view_camera));
-    set_lane(T_view_camera, kept.intrinsics, views[n].first_pixel, &lanes[n / VIEW_GROUP * VIEW_LANE_FIELDS * VIEW_GROUP + n % VIEW_GROUP]);
+    views.push_back(to_view(kept, T_view_frame));
+    set_lane(T_view_frame, kept.intrinsics, views[n].first_pixel, &lanes[n / VIEW_GROUP * VIEW_LANE_FIELDS * VIEW_GROUP + n % VIEW_GROUP]);
   }
   views_.send(std::move(views));
   view_lanes_.send(std::move(lanes));

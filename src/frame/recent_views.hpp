@@ -55,8 +55,9 @@ class RecentViews {
   /// The kept views that came before the one with this number, newest first.
   std::vector<View> views_before(std::uint64_t number) const;
 
-  /// Sends the kept views to the device, each with its pose relative to the current camera. @return their number
-  int prepare();
+  /// Sends the kept views to the device, each with its pose relative to the current camera, or to another frame. @return their number
+  int prepare() { return prepare(current_.T_world_camera); }
+  int prepare(const Eigen::Isometry3d& T_world_frame);
 
   /// Keeps the current view if its camera or pose differs enough from every kept view. @return whether it was kept
   bool keep_current();

@@ -79,6 +79,9 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
   T_camera_local_ = T_world_camera.inverse() * Eigen::Translation3d(low * block_size);
 }
 
+MapWindow::MapWindow(const BlockKey& first, int blocks, double block_size)
+    : window_{first.x, first.y, first.z, blocks, blocks, blocks, static_cast<float>(block_size)} {}
+
 BlockKey MapWindow::block(int cell) const {
   const int x = cell % window_.size_x, y = cell / window_.size_x % window_.size_y, z = cell / window_.size_x / window_.size_y;
   return {window_.origin_x + x, window_.origin_y + y, window_.origin_z + z};

@@ -23,6 +23,9 @@ class MapWindow {
   /// @throws BadFrame  the grid is far too large for its range
   MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin, const SurfelExtent& extent);
 
+  /// A cube of blocks. @param first  its lowest block. @param blocks  along each edge
+  MapWindow(const BlockKey& first, int blocks, double block_size);
+
   const Window& window() const { return window_; }
   const Eigen::Isometry3d& T_camera_local() const { return T_camera_local_; }
   int cells() const { return window_.size_x * window_.size_y * window_.size_z; }

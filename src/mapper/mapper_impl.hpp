@@ -17,6 +17,7 @@
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
+#include "planner/point_states.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
@@ -49,7 +50,8 @@ struct Mapper::Impl {
         settling(commands),
         list(commands, lists),
         creation(commands, lists),
-        remembering(commands) {
+        remembering(commands),
+        point_states(commands) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
@@ -71,6 +73,7 @@ struct Mapper::Impl {
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
+  std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
   void load_views(const std::vector<SavedView>& saved);
@@ -97,6 +100,8 @@ struct Mapper::Impl {
   std::optional<KnownSpace> known_space;  ///< made by the first frame that needs it
   Creation creation;
   Remembering remembering;
+
+  PointStates point_states;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken
