@@ -6,7 +6,6 @@ namespace frontier_surfels {
 namespace {
 
 constexpr double kLeastBytesPerVoxel = 1.5;  // of the device's memory; small grids need more
-constexpr std::size_t kMaxCameras = 16;      // limits the memory if a driver changes its intrinsics with every frame
 
 }  // namespace
 
@@ -37,16 +36,6 @@ Cameras::Cameras(Commands& commands, const Config& config) : commands_(commands)
   max_voxels_ = std::min(kMaxVoxels, bytes / kLeastBytesPerVoxel);
 }
 
-Camera& Cameras::find(const Intrinsics& intrinsics) {
-  const auto found =
-      std::find_if(cameras_.begin(), cameras_.end(), [&](const Camera& camera) { return same_camera(camera.intrinsics(), intrinsics); });
-  if (found != cameras_.end()) {
-    cameras_.splice(cameras_.begin(), cameras_, found);
-  } else {
-    cameras_.emplace_front(commands_, intrinsics, config_);
-    if (cameras_.size() > kMaxCameras) cameras_.pop_back();
-  }
-  return cameras_.front();
-}
+Camera& Cameras::find(const Intrinsics& intrinsics) { return cameras_.use(intrinsics, commands_, intrinsics, config_); }
 
 }  // namespace frontier_surfels

@@ -1,9 +1,8 @@
 /// A depth camera on the device: the grid of its views, the grid's fixed tables, and the newest image.
 #pragma once
 
-#include <list>
-
 #include "common/shared.h"
+#include "frame/camera_list.hpp"
 #include "frame/view_grid.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/config.hpp"
@@ -63,7 +62,7 @@ class Cameras {
   Commands& commands_;
   const Config config_;
   double max_voxels_;
-  std::list<Camera> cameras_;  ///< most recently used first
+  CameraList<Camera> cameras_;
 };
 
 }  // namespace frontier_surfels

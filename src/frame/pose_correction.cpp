@@ -7,8 +7,7 @@ namespace {
 
 // References are every second one of the last frames: further apart they see a surface by other pixels, and their errors differ.
 constexpr std::size_t kFrames = 15, kEvery = 2;
-constexpr double kLeastCosine = 0.94;    // of the angle between the optical axes: from elsewhere surfaces look different
-constexpr std::size_t kMaxCameras = 16;  // limits the memory if a driver changes its intrinsics with every frame
+constexpr double kLeastCosine = 0.94;  // of the angle between the optical axes: from elsewhere surfaces look different
 
 constexpr double kLeastShare = 0.1;  // of the recorded pose, so that errors of the alignment do not add up
 constexpr std::size_t kFirstFrames = 8;
@@ -53,14 +52,9 @@ std::vector<const ReferenceFrame*> PoseCorrection::History::references(const Eig
   return references;
 }
 
-std::list<PoseCorrection::History>::const_iterator PoseCorrection::find(const Intrinsics& intrinsics) const {
-  return std::find_if(histories_.begin(), histories_.end(),
-                      [&](const History& history) { return same_camera(history.intrinsics, intrinsics); });
-}
-
 CorrectedPose PoseCorrection::correct(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) const {
-  const auto history = find(image.intrinsics);
-  if (history == histories_.end()) return {T_world_camera, {}};
+  const History* history = histories_.find(image.intrinsics);
+  if (history == nullptr) return {T_world_camera, {}};
   CorrectedPose recorded = {T_world_camera, history->deviations};
   recorded.deviations.last.reset();
   const auto aligned = align(image, T_world_camera, history->references(T_world_camera), history->frames, config_);
@@ -74,14 +68,7 @@ CorrectedPose PoseCorrection::correct(const WorkingImage& image, const Eigen::Is
 
 void PoseCorrection::add(const WorkingImage& image, const CorrectedPose& pose) {
   if (!config_.correct_poses) return;
-  const auto found = find(image.intrinsics);
-  if (found == histories_.end()) {
-    histories_.emplace_front(image.intrinsics);
-    if (histories_.size() > kMaxCameras) histories_.pop_back();
-  } else {
-    histories_.splice(histories_.begin(), histories_, found);
-  }
-  History& history = histories_.front();
+  History& history = histories_.use(image.intrinsics, image.intrinsics);
   history.last.push_front({pose.T_world_camera, inverse_depths(image)});
   if (history.last.size() > kFrames) history.last.pop_back();
   history.deviations = pose.deviations;

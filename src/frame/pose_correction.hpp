@@ -8,9 +8,9 @@
 
 #include <Eigen/Geometry>
 #include <deque>
-#include <list>
 #include <optional>
 
+#include "frame/camera_list.hpp"
 #include "frame/pose_alignment.hpp"
 #include "frame/working_image.hpp"
 #include "frontier_surfels/config.hpp"
@@ -50,19 +50,22 @@ class PoseCorrection {
 
  private:
   /// The last frames of a camera.
-  struct History {
-    explicit History(const Intrinsics& camera) : intrinsics(camera) {}
+  class History {
+   public:
+    explicit History(const Intrinsics& intrinsics) : intrinsics_(intrinsics) {}
+    const Intrinsics& intrinsics() const { return intrinsics_; }
     std::vector<const ReferenceFrame*> references(const Eigen::Isometry3d& T_world_camera) const;
 
-    Intrinsics intrinsics;
     std::deque<ReferenceFrame> last;  ///< newest first
     std::size_t frames = 0;           ///< so far
     Deviations deviations;
+
+   private:
+    Intrinsics intrinsics_;
   };
-  std::list<History>::const_iterator find(const Intrinsics& intrinsics) const;
 
   Config config_;
-  std::list<History> histories_;  ///< of the cameras, the last one used first
+  CameraList<History> histories_;
 };
 
 }  // namespace frontier_surfels

@@ -46,7 +46,7 @@ std::map<BlockKey, std::vector<std::uint32_t>> by_region(const std::vector<Eigen
 Frame frame_of(const MapWindow& window, const KnownWorld& world) {
   Frame frame = {};
   frame.window = window.window();
-  frame.T_camera_local = frame.T_local_camera = to_transform(Eigen::Isometry3d::Identity());
+  frame.T_local_camera = to_transform(Eigen::Isometry3d::Identity());
   frame.has_seen = world.use_seen && !world.seen.empty() ? 1 : 0;
   frame.has_taken = world.use_seen && !world.taking_back.taken().empty() ? 1 : 0;
   frame.seen_shift = world.seen.shift();
@@ -60,6 +60,9 @@ struct PointStates::Sorted {
   std::vector<std::uint32_t> numbers;  ///< of the points, in this order
   std::vector<cl_int> cell_begin;      ///< [cells + 1]
   std::vector<cl_int4> chunks;
+
+  /// Of the coordinates' three rows: whole vectors are read at their ends.
+  std::size_t stride() const { return numbers.size() + STATE_CHUNK; }
 
   Sorted(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const Eigen::Vector3d& corner,
          double cell_size)
@@ -104,7 +107,7 @@ void PointStates::find_in_region(const BlockKey& region, const std::vector<Eigen
   const Eigen::Vector3d corner = kRegion * block_size * Eigen::Vector3d(region.x, region.y, region.z);
   const Sorted sorted(points, asked, corner, block_size / STATE_CELLS);
 
-  const std::size_t stride = asked.size() + STATE_CHUNK;  // whole vectors are read at the end
+  const std::size_t stride = sorted.stride();
   std::vector<float> coordinates(3 * stride, 0.0F);
   for (std::size_t n = 0; n < asked.size(); ++n)
     for (int axis = 0; axis < 3; ++axis)
@@ -135,8 +138,7 @@ void PointStates::mark_occupied(const MapWindow& window, const Sorted& sorted, c
   cell_begin_.send(sorted.cell_begin);
   const std::size_t items = count * (PAGE_SLOTS / commands_.lanes());
   commands_.run(kStage, "mark_occupied", items, kGroup, window.window(), static_cast<cl_float>(1 / kNewRadius), map.surfels(), map.alive(),
-                map.page_block(), pages_(), count, points_(), static_cast<cl_int>(sorted.numbers.size() + STATE_CHUNK), cell_begin_(),
-                states_());
+                map.page_block(), pages_(), count, points_(), static_cast<cl_int>(sorted.stride()), cell_begin_(), states_());
 }
 
 }  // namespace frontier_surfels

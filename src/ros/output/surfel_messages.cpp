@@ -145,7 +145,7 @@ void check_size(const PointCloud2& cloud) {
     throw Error("The cloud is cut short: it has " + std::to_string(cloud.data.size()) + " bytes instead of " + std::to_string(bytes) + ".");
 }
 
-geometry_msgs::Point to_message(const Eigen::Vector3f& p) {
+geometry_msgs::Point to_message(const Eigen::Vector3d& p) {
   geometry_msgs::Point message;
   message.x = p.x();
   message.y = p.y();
@@ -160,9 +160,7 @@ std::uint32_t count32(std::size_t count) {
 geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T) {
   const Eigen::Quaterniond rotation(T.linear());
   geometry_msgs::Pose pose;
-  pose.position.x = T.translation().x();
-  pose.position.y = T.translation().y();
-  pose.position.z = T.translation().z();
+  pose.position = to_message(Eigen::Vector3d(T.translation()));
   pose.orientation.x = rotation.x();
   pose.orientation.y = rotation.y();
   pose.orientation.z = rotation.z();
@@ -247,8 +245,8 @@ SurfelUpdate UpdateMessages::next() {
   message.since = since_;
   message.part = part_++;
   message.parts = parts_;
-  message.box_min = to_message(box_.min());
-  message.box_max = to_message(box_.max());
+  message.box_min = to_message(box_.min().cast<double>());
+  message.box_max = to_message(box_.max().cast<double>());
 
   const std::size_t removed_end = std::min(removed_.size(), removed_sent_ + most_);
   message.removed.assign(removed_.begin() + static_cast<std::ptrdiff_t>(removed_sent_),
