@@ -1,28 +1,17 @@
 #include "ros/mapper_ros.hpp"
 
 #include <frontier_surfels/FrameReport.h>
-#include <frontier_surfels/GetSurfels.h>
-#include <frontier_surfels/MapFile.h>
-#include <ros/callback_queue.h>
 #include <ros/console.h>
 #include <ros/init.h>
 #include <ros/publisher.h>
-#include <ros/service_server.h>
-#include <ros/spinner.h>
-#include <std_srvs/SetBool.h>
-#include <std_srvs/Trigger.h>
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
-#include <future>
 #include <iostream>
 #include <utility>
 
-#include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "frontier_surfels/number_text.hpp"
-#include "frontier_surfels/paths.hpp"
 #include "ros/input/camera_input.hpp"
 #include "ros/input/input_watch.hpp"
 #include "ros/input/warning_throttle.hpp"
@@ -30,6 +19,8 @@
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
 #include "ros/output/surfel_messages.hpp"
+#include "ros/services/map_services.hpp"
+#include "ros/services/service_thread.hpp"
 #include "ros/worker.hpp"
 
 namespace frontier_surfels {
@@ -43,8 +34,6 @@ NodeConfig read_and_warn(const ros::NodeHandle& pnh) {
   for (const std::string& warning : warnings) ROS_WARN("%s", warning.c_str());
   return config;
 }
-
-Eigen::Vector3f to_vector(const geometry_msgs::Point& p) { return Eigen::Vector3d(p.x, p.y, p.z).cast<float>(); }
 
 /// The cameras of a mapper.
 const CameraTopics kCameras[] = {{"depth/image", "depth/camera_info", "color/image"}};
@@ -68,6 +57,7 @@ class MapperRos::Impl {
   void tell_parameters();
   void report_dropped(const DroppedImage& image);
   void report_missing(const std::string& reason);
+  void pause(bool paused);
 
   // On the mapping thread
   bool map_next();
@@ -75,21 +65,9 @@ class MapperRos::Impl {
   FrameReport integrate(CameraInput& camera, const CompleteImage& image);
   void start_again(const ros::Time& from, const ros::Time& to);
   void show_other_map();
+  void reset_cameras();
   void publish_changes();
   void after_work();
-
-  // Services
-  void start_services();
-  template <typename Message>
-  void serve(const std::string& name, bool (Impl::*handler)(typename Message::Request&, typename Message::Response&));
-  template <typename Response, typename Job>
-  bool answer(Response& response, Job job);
-  bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
-  bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
-  bool save_map(MapFile::Request& request, MapFile::Response& response);
-  bool load_map(MapFile::Request& request, MapFile::Response& response);
-  std::uint32_t take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const;
-  bool get_surfels(GetSurfels::Request& request, GetSurfels::Response& response);
 
   ros::NodeHandle nh_, pnh_;
   const NodeConfig config_;
@@ -107,16 +85,14 @@ class MapperRos::Impl {
   std::vector<std::unique_ptr<CameraInput>> cameras_;
   std::unique_ptr<MapperDiagnostics> diagnostics_;
   std::unique_ptr<InputWatch> watch_;
-  ros::CallbackQueue service_queue_;  // its own, because services wait for the current frame and must not hold up the images
-  ros::NodeHandle service_nh_;
-  std::vector<ros::ServiceServer> services_;
-  std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+  std::unique_ptr<ServiceThread> services_;
+  std::unique_ptr<MapServices> map_services_;
   ros::WallTimer folder_timer_;
   bool stopped_ = false;
 };
 
 MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
-    : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame), service_nh_(pnh) {
+    : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame) {
   reports_ = pnh_.advertise<FrameReport>("report", 100);
   worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { after_work(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
@@ -131,7 +107,11 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   worker_->start();
   if (!config_.mapper.map_folder.empty())  // looked at also while no images come
     folder_timer_ = nh_.createWallTimer(ros::WallDuration(1), [this](const ros::WallTimerEvent&) { worker_->wake(); });
-  start_services();
+  services_ = std::make_unique<ServiceThread>(pnh_);
+  map_services_ = std::make_unique<MapServices>(
+      *services_, config_, mapper_, *worker_,
+      MapServices::Hooks{[this] { show_other_map(); }, [this] { reset_cameras(); }, [this](bool paused) { pause(paused); }});
+  services_->start();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
 }
 
@@ -141,17 +121,6 @@ void MapperRos::Impl::tell_parameters() {
   write_parameters(pnh_, in_force);
   const std::string& folder = in_force.mapper.map_folder;
   if (!folder.empty()) ROS_INFO("The map is kept in the folder %s.", folder.c_str());
-}
-
-void MapperRos::Impl::start_services() {
-  service_nh_.setCallbackQueue(&service_queue_);
-  serve<std_srvs::Trigger>("reset", &Impl::reset);
-  serve<std_srvs::SetBool>("pause", &Impl::pause);
-  serve<MapFile>("save_map", &Impl::save_map);
-  serve<MapFile>("load_map", &Impl::load_map);
-  serve<GetSurfels>("get_surfels", &Impl::get_surfels);
-  service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
-  service_spinner_->start();
 }
 
 MapperRos::Impl::~Impl() {
@@ -169,7 +138,7 @@ void MapperRos::Impl::stop() {
   watch_.reset();
   worker_->stop();  // before the cameras, because it asks them
   cameras_.clear();
-  service_spinner_->stop();
+  services_->stop();
   publisher_.reset();
   try {
     mapper_.flush();
@@ -276,6 +245,15 @@ void MapperRos::Impl::show_other_map() {
   diagnostics_->set_map(mapper_.statistics(), mapper_.size_on_disk());
 }
 
+void MapperRos::Impl::reset_cameras() {
+  for (const auto& camera : cameras_) camera->reset();
+}
+
+void MapperRos::Impl::pause(bool paused) {
+  for (const auto& camera : cameras_) camera->pause(paused);
+  diagnostics_->set_paused(paused);
+}
+
 void MapperRos::Impl::publish_changes() {
   if (!publisher_->wants_changes()) return;
   if (publisher_->sequence() == mapper_.sequence()) return;
@@ -291,105 +269,6 @@ void MapperRos::Impl::publish_changes() {
 void MapperRos::Impl::after_work() {
   publish_changes();
   diagnostics_->set_map_folder_fault(folder_watch_.look(Clock::now()));
-}
-
-template <typename Message>
-void MapperRos::Impl::serve(const std::string& name, bool (Impl::*handler)(typename Message::Request&, typename Message::Response&)) {
-  services_.push_back(service_nh_.advertiseService(name, handler, this));
-}
-
-/// Runs the job, and fills the response with the sentence that it returns or throws. @return false if the mapper is shutting down
-template <typename Response, typename Job>
-bool MapperRos::Impl::answer(Response& response, Job job) {
-  try {
-    response.message = job();
-    response.success = true;
-  } catch (const std::future_error&) {
-    return false;
-  } catch (const std::exception& fault) {
-    response.message = fault.what();
-    response.success = false;
-    ROS_WARN("%s", fault.what());
-  }
-  return true;
-}
-
-bool MapperRos::Impl::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-  return answer(response, [&] {
-    worker_->run_job([&] {
-      mapper_.reset();
-      show_other_map();
-      for (const auto& camera : cameras_) camera->reset();
-    });
-    return std::string("The map is empty.");
-  });
-}
-
-bool MapperRos::Impl::pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
-  for (const auto& camera : cameras_) camera->pause(request.data);
-  diagnostics_->set_paused(request.data);
-  response.success = true;
-  response.message = request.data ? "Mapping is paused." : "Mapping continues.";
-  return true;
-}
-
-bool MapperRos::Impl::save_map(MapFile::Request& request, MapFile::Response& response) {
-  return answer(response, [&] {
-    if (request.path.empty()) throw FileError("No path was given: give the path of the file to be written, which ends in .ply or .pcd.");
-    const SavedMap map = worker_->run_job([&] { return mapper_.saved_map(); });
-    const std::string path = absolute_path(request.path);
-    std::error_code ignored;  // a name may be too long to be asked for
-    if (map.surfels.empty() && std::filesystem::is_regular_file(path, ignored))
-      throw FileError("The map is empty, and was not written over the existing file " + path +
-                      ": delete the file, or choose another path.");
-    write_map(path, map);  // on this thread, so that mapping goes on
-    const std::string done = std::to_string(map.surfels.size()) + " surfels were written to " + path + ".";
-    ROS_INFO("%s", done.c_str());
-    return done;
-  });
-}
-
-bool MapperRos::Impl::load_map(MapFile::Request& request, MapFile::Response& response) {
-  return answer(response, [&] {
-    const std::string path = absolute_path(request.path);
-    worker_->run_job([&] {
-      mapper_.load(path);
-      show_other_map();
-    });
-    const std::string done = std::to_string(surfels_) + " surfels were read from " + path + ".";
-    ROS_INFO("%s", done.c_str());
-    return done;
-  });
-}
-
-/// Takes the surfels from first_id on, and of these at most `most` or as many as go into a message. @return next_id of the answer
-/// @throws Error if `most` is 0 and they do not go into a message
-std::uint32_t MapperRos::Impl::take_part(std::vector<Surfel>& surfels, std::uint32_t first_id, std::size_t most) const {
-  const auto before = [](const Surfel& surfel, std::uint32_t id) { return surfel.id < id; };
-  surfels.erase(surfels.begin(), std::lower_bound(surfels.begin(), surfels.end(), first_id, before));
-  const std::size_t limit = static_cast<std::size_t>(config_.message_limit);
-  if (most == 0 || surfels.size() <= std::min(most, limit)) return 0;  // to_cloud() refuses too many
-  const std::uint32_t next_id = surfels[std::min(most, limit)].id;
-  surfels.resize(std::min(most, limit));
-  return next_id;
-}
-
-/// The response has no field for an error. What is thrown becomes the error that the caller of the service gets.
-bool MapperRos::Impl::get_surfels(GetSurfels::Request& request, GetSurfels::Response& response) {
-  const Eigen::AlignedBox3f box(to_vector(request.box_min), to_vector(request.box_max));
-  try {
-    auto surfels = worker_->run_job([&] {
-      response.sequence = mapper_.sequence();
-      return box.min() == box.max() ? mapper_.surfels() : mapper_.surfels(box);
-    });
-    response.next_id = take_part(surfels, request.first_id, request.most);
-    response.surfels = messages::to_cloud(surfels, config_.confident_label(), static_cast<std::size_t>(config_.message_limit));
-  } catch (const std::future_error&) {
-    return false;  // the mapper is shutting down
-  }
-  response.surfels.header.frame_id = config_.world_frame;
-  response.surfels.header.stamp = ros::Time::now();
-  return true;
 }
 
 MapperRos::MapperRos(const ros::NodeHandle& nh, const ros::NodeHandle& pnh) : impl_(std::make_unique<Impl>(nh, pnh)) {}
