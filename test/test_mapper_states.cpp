@@ -1,30 +1,8 @@
 /// States of points against the slow obvious answer: the exact test of the frames, and the distances to all occupied surfels.
-#include <random>
-
-#include "mapper_input.hpp"
+#include "planner_input.hpp"
 
 namespace frontier_surfels {
 namespace {
-
-using Points = std::vector<Eigen::Vector3f>;
-
-Points random_points(std::size_t count, unsigned seed, const Eigen::AlignedBox3f& box) {
-  std::mt19937 random(seed);
-  Points points;
-  for (std::size_t n = 0; n < count; ++n) {
-    Eigen::Vector3f share;
-    for (int axis = 0; axis < 3; ++axis) share[axis] = std::uniform_real_distribution<float>(0, 1)(random);
-    points.push_back(box.min() + share.cwiseProduct(box.sizes()));
-  }
-  return points;
-}
-
-/// All that the room's frames may see, and some of what they cannot.
-Eigen::AlignedBox3f box_around(const std::vector<Surfel>& surfels) {
-  Eigen::AlignedBox3f box;
-  for (const Surfel& surfel : surfels) box.extend(surfel.position);
-  return {box.min() - Eigen::Vector3f::Constant(0.3F), box.max() + Eigen::Vector3f::Constant(0.3F)};
-}
 
 bool is_occupied(const std::vector<Surfel>& surfels, const Eigen::Vector3f& p) {
   return std::any_of(surfels.begin(), surfels.end(), [&](const Surfel& surfel) {
@@ -44,12 +22,6 @@ bool is_clear(const scoring::ExactTest& test, const Eigen::Vector3f& p, double d
   for (int n = 0; n < 27; ++n)
     if (test.known(p.cast<double>() + distance * Eigen::Vector3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)) != known) return false;
   return true;
-}
-
-Config as_recorded() {
-  Config config = undecimated();
-  config.correct_poses = false;
-  return config;
 }
 
 TEST(MapperStates, KeptViewsKnowExactly) {

@@ -53,6 +53,32 @@ class Mapper {
   /// @throws Error  an end is not finite, a ray has more than a million points, or the step is not from 0.0001 to 10 m
   std::vector<RayState> ray_states(const std::vector<Ray>& rays_world, bool stop_at_unknown, double step = 0.01) const;
 
+  /// The nearest surfel of each point, of any label, whose centre is at most `reach` [m] away; of several, the one with the lowest id. New
+  /// surfels have radii of 0.87 voxels, so that the distance to their discs is less by no more than that. With a map_folder: by what is in
+  /// memory.
+  /// @throws Error  a point is not finite, the reach is not from 0.001 to 5 m, or there are more than 100 million points
+  std::vector<NearestBoundary> nearest_boundaries(const std::vector<Eigen::Vector3f>& points_world, double reach) const;
+
+  /// How far free points are from the boundary of free space, which is the nearest surfel, measured or frontier [m]: at most `most` [m],
+  /// and 0 for points that are not free. @throws Error  as nearest_boundaries(), whose reach is `most`
+  std::vector<float> clearance(const std::vector<Eigen::Vector3f>& points_world, double most) const;
+
+  /// What there is in boxes with edges along the world's axes [m]: occupied if any part is occupied, else unknown if any part is unknown,
+  /// else free. Asked are points at most `step` [m] apart, on all faces and within; and for thin things between them the surfels whose
+  /// centres lie within: a frontier surfel says that a part is unknown.
+  /// @throws Error  a corner is not finite, an edge is not longer than 0 or is longer than 20 m, the step is not from 0.001 to 1 m, or the
+  ///                boxes have more than 100 million points
+  std::vector<SpaceState> box_states(const std::vector<Eigen::AlignedBox3f>& boxes_world, double step = 0.05) const;
+
+  /// Where a box with edges along the world's axes, such as a robot's, must stop when its centre moves along paths: where the first part of
+  /// it becomes occupied, or unknown if that is asked for. The distances are those of its centre. The box is asked for as by box_states()
+  /// at the start, then at most every `step` [m] on the faces that look ahead; surfels stop it anywhere between.
+  /// @throws Error  an end is not finite, a path has more than a million steps, or box_states() would refuse the box, the step or the
+  /// number
+  ///                of points
+  std::vector<RayState> path_states(const std::vector<Ray>& paths_world, const Eigen::Vector3f& box_size, bool stop_at_unknown,
+                                    double step = 0.05) const;
+
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;
 

@@ -161,6 +161,10 @@ namespace frontier_surfels {
 #define SPACE_FREE 1
 #define SPACE_OCCUPIED 2
 
+// What the surfel nearest to a point is like.
+#define BOUNDARY_IN_FRONT 1  // the point is on its known side
+#define BOUNDARY_OCCUPIED 2
+
 // Numbers of surfels that kernels count as they go.
 #define COUNT_IN_VIEW 0
 #define COUNT_LARGE 1

@@ -79,8 +79,13 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
   T_camera_local_ = T_world_camera.inverse() * Eigen::Translation3d(low * block_size);
 }
 
-MapWindow::MapWindow(const BlockKey& first, int blocks, double block_size)
-    : window_{first.x, first.y, first.z, blocks, blocks, blocks, static_cast<float>(block_size)} {}
+MapWindow::MapWindow(const BlockKey& first, const BlockKey& last, double block_size)
+    : window_{first.x, first.y, first.z, last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1, static_cast<float>(block_size)} {
+}
+
+Eigen::Vector3d MapWindow::corner_world() const {
+  return Eigen::Vector3d(window_.origin_x, window_.origin_y, window_.origin_z) * window_.block_size;
+}
 
 BlockKey MapWindow::block(int cell) const {
   const int x = cell % window_.size_x, y = cell / window_.size_x % window_.size_y, z = cell / window_.size_x / window_.size_y;

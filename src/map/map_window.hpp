@@ -23,13 +23,14 @@ class MapWindow {
   /// @throws BadFrame  the grid is far too large for its range
   MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, double block_size, double margin, const SurfelExtent& extent);
 
-  /// A cube of blocks. @param first  its lowest block. @param blocks  along each edge
-  MapWindow(const BlockKey& first, int blocks, double block_size);
+  /// The blocks from `first`, the lowest one, to `last`, the highest one.
+  MapWindow(const BlockKey& first, const BlockKey& last, double block_size);
 
   const Window& window() const { return window_; }
   const Eigen::Isometry3d& T_camera_local() const { return T_camera_local_; }
   int cells() const { return window_.size_x * window_.size_y * window_.size_z; }
-  BlockKey block(int cell) const;  ///< the block that a cell of the window stands for
+  Eigen::Vector3d corner_world() const;  ///< its lowest corner [m]
+  BlockKey block(int cell) const;        ///< the block that a cell of the window stands for
 
   /// May a surfel of this block be in view? True for every block with a surfel that kernels/stages/5_visit.cl finds in view.
   bool meets_grid(const BlockKey& block) const;

@@ -25,7 +25,8 @@ class SurfelMap {
   SurfelMap(Commands& commands, Lists& lists, const Config& config);
 
   std::size_t size() const { return size_; }
-  std::size_t bytes() const;            ///< memory of the surfels and of their index, on the device and on the host
+  double largest_radius() const { return largest_radius_; }  ///< no surfel is larger [m]
+  std::size_t bytes() const;                                 ///< memory of the surfels and of their index, on the device and on the host
   std::size_t untouched_bytes() const;  ///< part of the buffers on a CPU that the operating system has not backed with memory yet
 
   /// @name A frame. Kernels work on the pages of the window. They clear the bits of removed surfels in `alive`, and set those of removed,

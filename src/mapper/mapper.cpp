@@ -7,23 +7,8 @@
 #include "map/seen_fill.hpp"
 #include "map/view_packing.hpp"
 #include "mapper/mapper_impl.hpp"
-#include "planner/ray_states.hpp"
 
 namespace frontier_surfels {
-namespace {
-
-/// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
-template <typename Work>
-auto on_device(Work work) -> decltype(work()) {
-  try {
-    return work();
-  } catch (const std::exception& error) {
-    throw_device_error(error);
-  }
-}
-
-}  // namespace
-
 Mapper::Mapper(const Config& config) : impl_(on_device([&] { return std::make_unique<Impl>(config); })) {}
 Mapper::~Mapper() = default;
 Mapper::Mapper(Mapper&&) noexcept = default;
@@ -64,21 +49,6 @@ Changes Mapper::Impl::changes(std::uint64_t since) {
   map.reserve_ids(told.slowest());
   readers = told;  // nothing has failed: the reader gets the changes
   return changes;
-}
-
-std::vector<SpaceState> Mapper::states(const std::vector<Eigen::Vector3f>& points_world) const {
-  return on_device([&] { return impl_->states(points_world); });
-}
-
-std::vector<RayState> Mapper::ray_states(const std::vector<Ray>& rays_world, bool stop_at_unknown, double step) const {
-  return frontier_surfels::ray_states(rays_world, stop_at_unknown, step,
-                                      [this](const std::vector<Eigen::Vector3f>& points_world) { return states(points_world); });
-}
-
-std::vector<SpaceState> Mapper::Impl::states(const std::vector<Eigen::Vector3f>& points_world) {
-  begin_call();
-  remember_forgotten();
-  return point_states.find(points_world, {views, seen, taking_back, map, config.seen_points});
 }
 
 std::vector<Surfel> Mapper::whole_map() const {

@@ -17,6 +17,7 @@
 #include "map/seen_points.hpp"
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
+#include "planner/boundaries.hpp"
 #include "planner/point_states.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
@@ -30,6 +31,16 @@
 #include "storage/map_archive.hpp"
 
 namespace frontier_surfels {
+
+/// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
+template <typename Work>
+auto on_device(Work work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    throw_device_error(error);
+  }
+}
 
 struct Mapper::Impl {
   explicit Impl(const Config& wanted)
@@ -51,7 +62,8 @@ struct Mapper::Impl {
         list(commands, lists),
         creation(commands, lists),
         remembering(commands),
-        point_states(commands) {
+        point_states(commands),
+        boundaries(commands, lists) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
@@ -74,6 +86,7 @@ struct Mapper::Impl {
   void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
   std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
+  std::vector<FirstSurfel> first_within(const std::vector<MovingBox>& boxes, bool frontier_counts);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
   void load_views(const std::vector<SavedView>& saved);
@@ -101,7 +114,9 @@ struct Mapper::Impl {
   Creation creation;
   Remembering remembering;
 
+  // Planners' questions
   PointStates point_states;
+  Boundaries boundaries;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken

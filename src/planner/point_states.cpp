@@ -1,62 +1,37 @@
 #include "planner/point_states.hpp"
 
-#include <cmath>
-#include <map>
+#include <algorithm>
 #include <string>
 #include <utility>
 
+#include "planner/regions.hpp"
 #include "stages/frame.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr const char* kStage = "states";
-constexpr int kRegion = 8;                        // blocks along the edge of what is asked for at once
 constexpr int kCubes = STATE_CELLS / STATE_CUBE;  // along a block's edge
-constexpr int kCubesOfRegion = kRegion * kCubes;  // along an edge
 constexpr int kCellsOfCube = STATE_CUBE * STATE_CUBE * STATE_CUBE;
-constexpr int kCellCount = kCubesOfRegion * kCubesOfRegion * kCubesOfRegion * kCellsOfCube;
-constexpr float kFarthest = 1e6F;  // [m] nothing is mapped beyond
-
-/// Number of a region's cell, as state_cell() in kernels/planner/states.cl counts them. @param cell  from the region's corner
-int cell_number(const Eigen::Array3i& cell) {
-  const Eigen::Array3i cube = cell / STATE_CUBE, in_cube = cell - STATE_CUBE * cube;
-  const int number = (cube.z() * kCubesOfRegion + cube.y()) * kCubesOfRegion + cube.x();
-  return ((number * STATE_CUBE + in_cube.z()) * STATE_CUBE + in_cube.y()) * STATE_CUBE + in_cube.x();
-}
-
-/// Numbers of the points in each region. Points far beyond the map are left out.
-std::map<BlockKey, std::vector<std::uint32_t>> by_region(const std::vector<Eigen::Vector3f>& points, double edge) {
-  std::map<BlockKey, std::vector<std::uint32_t>> regions;
-  BlockKey last = {};
-  std::vector<std::uint32_t>* numbers = nullptr;
-  for (std::uint32_t n = 0; n < points.size(); ++n) {
-    const Eigen::Vector3f& p = points[n];
-    if (!p.allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that it has no state.");
-    if (p.cwiseAbs().maxCoeff() > kFarthest) continue;
-    const Eigen::Array3i at = (p.cast<double>() / edge).array().floor().cast<int>();
-    const BlockKey region = {at.x(), at.y(), at.z()};
-    if (numbers == nullptr || region != last) numbers = &regions[region];
-    last = region;
-    numbers->push_back(n);
-  }
-  return regions;
-}
 
 Frame frame_of(const MapWindow& window, const KnownWorld& world) {
-  Frame frame = {};
-  frame.window = window.window();
-  frame.T_local_camera = to_transform(Eigen::Isometry3d::Identity());
-  frame.has_seen = world.use_seen && !world.seen.empty() ? 1 : 0;
+  Frame frame = make_frame(window, world.use_seen ? &world.seen : nullptr);
   frame.has_taken = world.use_seen && !world.taking_back.taken().empty() ? 1 : 0;
-  frame.seen_shift = world.seen.shift();
   return frame;
+}
+
+/// The blocks in which some points lie.
+MapWindow window_around(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, double block_size) {
+  Eigen::AlignedBox3f box;
+  for (const std::uint32_t n : asked) box.extend(points[n]);
+  return {block_at(box.min().cast<double>(), block_size), block_at(box.max().cast<double>(), block_size), block_size};
 }
 
 }  // namespace
 
-/// The points of a region by cells.
+/// The points of a window by cells.
 struct PointStates::Sorted {
+  Eigen::Array3i cubes;                ///< of the window, along each axis
   std::vector<std::uint32_t> numbers;  ///< of the points, in this order
   std::vector<cl_int> cell_begin;      ///< [cells + 1]
   std::vector<cl_int4> chunks;
@@ -64,25 +39,34 @@ struct PointStates::Sorted {
   /// Of the coordinates' three rows: whole vectors are read at their ends.
   std::size_t stride() const { return numbers.size() + STATE_CHUNK; }
 
-  Sorted(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const Eigen::Vector3d& corner,
-         double cell_size)
-      : numbers(asked.size()), cell_begin(kCellCount + 1, 0) {
+  /// @param corner  of the window [m]. @param cell_size  [m]
+  Sorted(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const Window& window,
+         const Eigen::Vector3d& corner, double cell_size)
+      : cubes(kCubes * Eigen::Array3i(window.size_x, window.size_y, window.size_z)), numbers(asked.size()) {
     std::vector<int> cells;
     cells.reserve(asked.size());
+    cell_begin.assign(static_cast<std::size_t>(cubes.prod()) * kCellsOfCube + 1, 0);
     for (const std::uint32_t n : asked) {
       const Eigen::Array3i cell = ((points[n].cast<double>() - corner) / cell_size).array().cast<int>();
-      cells.push_back(cell_number(cell.max(0).min(kRegion * STATE_CELLS - 1)));
+      cells.push_back(cell_number(cell.max(0).min(STATE_CUBE * cubes - 1)));
       ++cell_begin[cells.back() + 1];
     }
-    for (int cell = 0; cell < kCellCount; ++cell) cell_begin[cell + 1] += cell_begin[cell];
+    for (std::size_t cell = 1; cell < cell_begin.size(); ++cell) cell_begin[cell] += cell_begin[cell - 1];
     std::vector<cl_int> next(cell_begin.begin(), cell_begin.end() - 1);
     for (std::size_t n = 0; n < asked.size(); ++n) numbers[next[cells[n]]++] = asked[n];
     add_chunks();
   }
 
+  /// Number of a cell, as state_cell() in kernels/planner/states.cl counts them. @param cell  from the window's corner
+  int cell_number(const Eigen::Array3i& cell) const {
+    const Eigen::Array3i cube = cell / STATE_CUBE, in_cube = cell - STATE_CUBE * cube;
+    const int number = (cube.z() * cubes.y() + cube.y()) * cubes.x() + cube.x();
+    return ((number * STATE_CUBE + in_cube.z()) * STATE_CUBE + in_cube.y()) * STATE_CUBE + in_cube.x();
+  }
+
   void add_chunks() {
-    for (int cube = 0; cube < kCellCount / kCellsOfCube; ++cube) {
-      const int x = cube % kCubesOfRegion, y = cube / kCubesOfRegion % kCubesOfRegion, z = cube / (kCubesOfRegion * kCubesOfRegion);
+    for (int cube = 0; cube < cubes.prod(); ++cube) {
+      const int x = cube % cubes.x(), y = cube / cubes.x() % cubes.y(), z = cube / (cubes.x() * cubes.y());
       const int begin = cell_begin[cube * kCellsOfCube], end = cell_begin[(cube + 1) * kCellsOfCube];
       for (int first = begin; first < end; first += STATE_CHUNK)
         chunks.push_back({{first, std::min(STATE_CHUNK, end - first), x | y << 16, z}});
@@ -95,17 +79,18 @@ PointStates::PointStates(Commands& commands)
 
 std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world) {
   std::vector<SpaceState> states(points_world.size(), SpaceState::kUnknown);
-  for (const auto& [region, asked] : by_region(points_world, kRegion * world.map.block_size()))
-    find_in_region(region, points_world, asked, world, states);
+  for (std::size_t n = 0; n < points_world.size(); ++n)
+    if (!points_world[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that it has no state.");
+  for (const auto& [region, asked] : by_region(points_world, world.map.block_size())) find_some(points_world, asked, world, states);
   return states;
 }
 
-void PointStates::find_in_region(const BlockKey& region, const std::vector<Eigen::Vector3f>& points,
-                                 const std::vector<std::uint32_t>& asked, const KnownWorld& world, std::vector<SpaceState>& states) {
+void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
+                            std::vector<SpaceState>& states) {
   const double block_size = world.map.block_size();
-  const MapWindow window({kRegion * region.x, kRegion * region.y, kRegion * region.z}, kRegion, block_size);
-  const Eigen::Vector3d corner = kRegion * block_size * Eigen::Vector3d(region.x, region.y, region.z);
-  const Sorted sorted(points, asked, corner, block_size / STATE_CELLS);
+  const MapWindow window = window_around(points, asked, block_size);
+  const Eigen::Vector3d corner = window.corner_world();
+  const Sorted sorted(points, asked, window.window(), corner, block_size / STATE_CELLS);
 
   const std::size_t stride = sorted.stride();
   std::vector<float> coordinates(3 * stride, 0.0F);
@@ -128,10 +113,10 @@ void PointStates::find_in_region(const BlockKey& region, const std::vector<Eigen
   for (std::size_t n = 0; n < asked.size(); ++n) states[sorted.numbers[n]] = static_cast<SpaceState>(found[n]);
 }
 
-/// Surfels of the blocks around the region reach into it as well.
+/// Surfels of the blocks around the window reach into it as well, by a voxel.
 void PointStates::mark_occupied(const MapWindow& window, const Sorted& sorted, const SurfelMap& map) {
   std::vector<cl_uint> pages;
-  for (const BlockKey& block : window.blocks_near(0, std::size_t{1} << 20))
+  for (const BlockKey& block : window.blocks_near(map.largest_radius() / kNewRadius, std::size_t{1} << 20))
     if (const BlockIndex::Pages* own = map.index().find(block)) pages.insert(pages.end(), own->begin(), own->end());
   const auto count = static_cast<cl_int>(pages.size());
   pages_.send(std::move(pages));

@@ -34,8 +34,8 @@ class PointStates {
 
  private:
   struct Sorted;
-  void find_in_region(const BlockKey& region, const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked,
-                      const KnownWorld& world, std::vector<SpaceState>& states);
+  void find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
+                 std::vector<SpaceState>& states);
   void mark_occupied(const MapWindow& window, const Sorted& sorted, const SurfelMap& map);
 
   Commands& commands_;

@@ -10,6 +10,10 @@
 
 namespace frontier_surfels {
 
+/// The part of a frame's structure that questions about points of a window need. The camera's frame is the window's.
+/// @param seen  null: seen points are not asked
+Frame make_frame(const MapWindow& window, const SeenPoints* seen);
+
 /// Makes the structure that every kernel of a frame is given (kernels/common/shared.h). @param seen  null: seen points are not asked
 Frame make_frame(const Camera& camera, const MapWindow& window, const RecentViews& views, const SeenPoints* seen, const Limits& limits);
 

@@ -1,8 +1,11 @@
-/// What a map says of points and rays of the world: Mapper::states(), Mapper::ray_states().
+/// What a map says of points, rays, boxes and paths of the world: Mapper::states() and the questions after it.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
+
+#include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
 
@@ -17,10 +20,21 @@ struct Ray {
   Eigen::Vector3f from = Eigen::Vector3f::Zero(), to = Eigen::Vector3f::Zero();
 };
 
-/// Where a ray ends, and why.
+/// Where a ray, or a path, ends, and why.
 struct RayState {
   SpaceState state = SpaceState::kUnknown;  ///< what stopped the ray; kFree: nothing, it has reached its end
   float distance = 0;                       ///< from its start to there [m]
+};
+
+/// The boundary of known space near a point: the surfel whose centre is nearest. Which side of it the point is on is not its state: near
+/// the rims of sheets of frontier, a free point may be behind a surfel that looks past it.
+struct NearestBoundary {
+  static constexpr std::uint32_t kNone = 0xffffffff;
+
+  float distance = std::numeric_limits<float>::infinity();  ///< from the surfel's centre [m]; infinite: none is within reach
+  bool in_front = false;                                    ///< is the point on the known side, to which the surfel's normal points?
+  Label label = Label::kFrontier;                           ///< of the surfel
+  std::uint32_t id = kNone;                                 ///< of the surfel; kNone: none is within reach
 };
 
 }  // namespace frontier_surfels

@@ -1,0 +1,106 @@
+#include "planner/boundaries.hpp"
+
+#include <string>
+#include <utility>
+
+#include "config/config_text.hpp"
+#include "planner/regions.hpp"
+#include "stages/frame.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr const char* kStage = "boundaries";
+
+void check(const std::vector<Eigen::Vector3f>& points, double reach) {
+  if (!(reach >= 0.001 && reach <= 5)) throw Error("The reach is " + to_text(reach) + " m: it must be from 0.001 to 5 m.");
+  if (static_cast<double>(points.size()) > kMostAsked)
+    throw Error(std::to_string(points.size()) + " points are asked for at once: at most 100 million can be.");
+  for (std::size_t n = 0; n < points.size(); ++n)
+    if (!points[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that nothing is near it.");
+}
+
+cl_float4 to_float4(const Eigen::Vector3d& v) {
+  const Eigen::Vector3f f = v.cast<float>();
+  return {{f.x(), f.y(), f.z(), 0}};
+}
+
+}  // namespace
+
+Boundaries::Boundaries(Commands& commands, Lists& lists)
+    : commands_(commands),
+      cells_(commands, lists),
+      points_(commands),
+      boxes_(commands),
+      distances_(commands),
+      slots_(commands),
+      sides_(commands) {}
+
+std::vector<NearestBoundary> Boundaries::nearest(const std::vector<Eigen::Vector3f>& points_world, double reach, const SurfelMap& map) {
+  check(points_world, reach);
+  std::vector<NearestBoundary> nearest(points_world.size());
+  for (const auto& [region, asked] : by_region(points_world, map.block_size())) {
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t n : asked) box.extend(points_world[n].cast<double>());
+    cells_.list({box.min().array() - reach, box.max().array() + reach}, map);
+    if (cells_.empty()) continue;
+
+    const std::size_t stride = asked.size() + commands_.lanes();  // whole vectors are read at the rows' ends
+    std::vector<float> coordinates(3 * stride, 0.0F);
+    for (std::size_t n = 0; n < asked.size(); ++n)
+      for (int axis = 0; axis < 3; ++axis)
+        coordinates[axis * stride + n] = static_cast<float>(points_world[asked[n]][axis] - cells_.corner_world()[axis]);
+    points_.send(std::move(coordinates));
+    distances_.resize(asked.size());
+    slots_.resize(asked.size());
+    sides_.resize(asked.size());
+    commands_.run(kStage, "find_nearest_boundaries", commands_.chunks(asked.size()), commands_.device().heavy_group(), cells_.window(),
+                  cells_.cells(), static_cast<cl_float>(reach), map.surfels(), map.page_block(), cells_.entries(), cells_.begin(),
+                  points_(), static_cast<cl_int>(stride), static_cast<cl_int>(asked.size()), distances_(), slots_(), sides_());
+    const std::vector<float> distances = distances_.read(asked.size());
+    const std::vector<cl_uint> slots = slots_.read(asked.size());
+    const std::vector<cl_uchar> sides = sides_.read(asked.size());
+    for (std::size_t n = 0; n < asked.size(); ++n) {
+      if (slots[n] == NearestBoundary::kNone) continue;
+      nearest[asked[n]] = {distances[n], (sides[n] & BOUNDARY_IN_FRONT) != 0,
+                           (sides[n] & BOUNDARY_OCCUPIED) != 0 ? Label::kOccupied : Label::kFrontier, slots[n]};
+    }
+  }
+  return nearest;
+}
+
+std::vector<FirstSurfel> Boundaries::first_within(const std::vector<MovingBox>& boxes, bool frontier_counts, const SurfelMap& map) {
+  std::vector<FirstSurfel> first(boxes.size());
+  std::vector<Eigen::Vector3f> starts;
+  for (const MovingBox& box : boxes) starts.push_back(box.from);
+  for (const auto& [region, asked] : by_region(starts, map.block_size())) {
+    Eigen::AlignedBox3d around;
+    for (const std::uint32_t n : asked)
+      for (const Eigen::Vector3f& end : {boxes[n].from, boxes[n].to}) {
+        around.extend((end - boxes[n].half_size).cast<double>());
+        around.extend((end + boxes[n].half_size).cast<double>());
+      }
+    cells_.list(around, map);
+    if (cells_.empty()) continue;
+
+    std::vector<cl_float4> sent;
+    for (const std::uint32_t n : asked) {
+      sent.push_back(to_float4(boxes[n].from.cast<double>() - cells_.corner_world()));
+      sent.push_back(to_float4((boxes[n].to - boxes[n].from).cast<double>()));
+      sent.push_back(to_float4(boxes[n].half_size.cast<double>()));
+    }
+    boxes_.send(std::move(sent));
+    distances_.resize(asked.size());
+    sides_.resize(asked.size());
+    commands_.run(kStage, "move_boxes", asked.size(), commands_.device().heavy_group(), cells_.window(), cells_.cells(),
+                  static_cast<cl_int>(frontier_counts), map.surfels(), cells_.entries(), cells_.begin(), boxes_(),
+                  static_cast<cl_int>(asked.size()), distances_(), sides_());
+    const std::vector<float> shares = distances_.read(asked.size());
+    const std::vector<cl_uchar> sides = sides_.read(asked.size());
+    for (std::size_t n = 0; n < asked.size(); ++n)
+      first[asked[n]] = {shares[n], (sides[n] & BOUNDARY_OCCUPIED) != 0 ? Label::kOccupied : Label::kFrontier};
+  }
+  return first;
+}
+
+}  // namespace frontier_surfels
