@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/planner/state_grid.hpp"
 #include "frontier_surfels/planner/states.hpp"
 #include "frontier_surfels/types.hpp"
 
@@ -78,6 +79,12 @@ class Mapper {
   ///                of points
   std::vector<RayState> path_states(const std::vector<Ray>& paths_world, const Eigen::Vector3f& box_size, bool stop_at_unknown,
                                     double step = 0.05) const;
+
+  /// The blocks of a grid of states that may have changed since the map had sequence number `since`; 0, or a number from before the map was
+  /// replaced: the whole grid (StateChanges::since is 0 then). What is only forgotten, because kept views are replaced by seen points or
+  /// blocks go to the map folder, counts as no change. StateGrid::take() tells what is different. @param resolution  edge of a cell [m]
+  /// @throws Error  the resolution is not from 0.02 to 1 m
+  StateChanges state_changes(std::uint64_t since, double resolution) const;
 
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;

@@ -19,6 +19,7 @@
 #include "opencl/commands.hpp"
 #include "planner/boundaries.hpp"
 #include "planner/point_states.hpp"
+#include "planner/state_blocks.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
@@ -63,7 +64,8 @@ struct Mapper::Impl {
         creation(commands, lists),
         remembering(commands),
         point_states(commands),
-        boundaries(commands, lists) {
+        boundaries(commands, lists),
+        state_blocks(commands) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
@@ -86,6 +88,8 @@ struct Mapper::Impl {
   void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
   std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
+  StateChanges state_changes(std::uint64_t since, double resolution);
+  std::vector<BlockKey> known_blocks() const;
   std::vector<FirstSurfel> first_within(const std::vector<MovingBox>& boxes, bool frontier_counts);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
@@ -117,6 +121,8 @@ struct Mapper::Impl {
   // Planners' questions
   PointStates point_states;
   Boundaries boundaries;
+  LookedAt looked_at;
+  StateBlocks state_blocks;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken

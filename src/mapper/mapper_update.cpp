@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "frame/working_image.hpp"
+#include "map/view_blocks.hpp"
 #include "mapper/mapper_impl.hpp"
 #include "stages/removal.hpp"
 #include "stages/thin_gaps.hpp"
@@ -146,6 +147,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
   pose_correction.add(image, pose);
   report.view_kept = views.keep_current();
   sequence = report.sequence;
+  looked_at.note(blocks_of_view(image.intrinsics, pose.T_world_camera, config.z_max, map.block_size()).blocks, sequence);
   frame_on_device = pages_changed ? 0 : sequence;
   pages_changed = false;
   if (archive) {

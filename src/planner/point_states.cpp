@@ -77,16 +77,16 @@ struct PointStates::Sorted {
 PointStates::PointStates(Commands& commands)
     : commands_(commands), points_(commands), chunks_(commands), cell_begin_(commands), pages_(commands), states_(commands) {}
 
-std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world) {
+std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world, bool with_surfels) {
   std::vector<SpaceState> states(points_world.size(), SpaceState::kUnknown);
   for (std::size_t n = 0; n < points_world.size(); ++n)
     if (!points_world[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that it has no state.");
-  for (const auto& [region, asked] : by_region(points_world, world.map.block_size())) find_some(points_world, asked, world, states);
+  for (const auto& [region, asked] : by_region(points_world, world.map.block_size())) find_some(points_world, asked, world, with_surfels, states);
   return states;
 }
 
 void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
-                            std::vector<SpaceState>& states) {
+                            bool with_surfels, std::vector<SpaceState>& states) {
   const double block_size = world.map.block_size();
   const MapWindow window = window_around(points, asked, block_size);
   const Eigen::Vector3d corner = window.corner_world();
@@ -108,7 +108,7 @@ void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const st
                 world.views.view_lanes(), static_cast<cl_int>(view_count), world.views.depths(), seen.slots(), seen.tables(),
                 seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), points_(), static_cast<cl_int>(stride), chunks_(),
                 static_cast<cl_int>(sorted.chunks.size()), states_());
-  mark_occupied(window, sorted, world.map);
+  if (with_surfels) mark_occupied(window, sorted, world.map);
   const std::vector<cl_uchar> found = states_.read(asked.size());
   for (std::size_t n = 0; n < asked.size(); ++n) states[sorted.numbers[n]] = static_cast<SpaceState>(found[n]);
 }

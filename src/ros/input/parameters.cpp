@@ -102,6 +102,8 @@ std::vector<std::string> NodeConfig::problems() const {
   });
   if (messages::strip_slash(world_frame).empty())
     faults.push_back("world_frame is empty: it must be the tf frame in which the map does not move.");
+  if (!(projected_min_z < projected_max_z))
+    faults.push_back("projected_min_z is not below projected_max_z: ~projected_map shows the heights between them.");
   if (on_time_jump != "keep" && on_time_jump != "reset")
     faults.push_back("on_time_jump is '" + on_time_jump + "': it must be keep or reset.");
   if (use_color && color_transport == "compressedDepth")

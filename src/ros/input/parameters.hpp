@@ -24,6 +24,14 @@ struct NodeConfig {
   int marker_limit = 100000;
   std::string cloud_confidence = "frontier";
   int message_limit = 16000000;
+  double planner_resolution = 0.05;
+  double planner_period = 0.5;
+  double cluster_min_area = 0.05;
+  double cluster_max_extent = 1.0;
+  double view_distance = 1.2;
+  double view_clearance = 0.3;
+  double projected_min_z = 0.1;
+  double projected_max_z = 1.5;
 
   /// Every fault, one sentence each, the mapper's included; empty when the configuration can be used.
   std::vector<std::string> problems() const;
@@ -59,6 +67,18 @@ void for_each_node_field(ConfigT& config, Visitor&& visit) {
                   "because roscpp refuses more than 1 GB",
                   1000, 16000000},
         config.message_limit);
+  visit(FieldInfo{"planner_resolution", "m", "edge of a cell of ~states_update, ~octomap_full and ~projected_map", 0.02, 1},
+        config.planner_resolution);
+  visit(FieldInfo{"planner_period", "s", "shortest time between two messages of ~states_update, ~clusters, ~octomap_full or ~projected_map",
+                  0.1, 3600},
+        config.planner_period);
+  visit(FieldInfo{"cluster_min_area", "m2", "smaller clusters of frontier surfels are not told", 0, 100}, config.cluster_min_area);
+  visit(FieldInfo{"cluster_max_extent", "m", "clusters are divided until they are at most as long as this", 0.1, 100},
+        config.cluster_max_extent);
+  visit(FieldInfo{"view_distance", "m", "distance between a cluster and its viewpoints", 0.1, 100}, config.view_distance);
+  visit(FieldInfo{"view_clearance", "m", "distance between a viewpoint and what is not free", 0, 10}, config.view_clearance);
+  visit(FieldInfo{"projected_min_z", "m", "lowest height of the band that ~projected_map shows", -1e6, 1e6}, config.projected_min_z);
+  visit(FieldInfo{"projected_max_z", "m", "highest height of the band that ~projected_map shows", -1e6, 1e6}, config.projected_max_z);
 }
 
 /// Reads all parameters in the namespace of `pnh`.

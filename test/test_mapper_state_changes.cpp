@@ -1,0 +1,127 @@
+/// The grid of states, as the mapper makes it: cells against points and surfels, and changes against the whole.
+#include "frontier_surfels/planner/state_grid.hpp"
+#include "planner_input.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+constexpr double kResolution = 0.05;
+
+TEST(MapperStateChanges, CellsAgainstPointsAndSurfels) {
+  Mapper mapper(as_recorded());
+  integrate_all(mapper, orbit_frames(coarse_camera(), 30, 5));
+  StateGrid grid(kResolution);
+  ASSERT_TRUE(grid.apply(mapper.state_changes(0, kResolution)));
+  std::map<std::array<int, 3>, int> passes;  // of surfels through cells: 1 frontier, 2 occupied
+  const std::vector<Surfel> surfels = mapper.surfels();
+  for (const Surfel& surfel : surfels) {
+    const Eigen::Array3f reach = surfel.radius * (1 - surfel.normal.array().square()).max(0).sqrt();
+    const Eigen::Array3i low = ((surfel.position.array() - reach) / kResolution).floor().cast<int>(),
+                         high = ((surfel.position.array() + reach) / kResolution).floor().cast<int>();
+    for (int x = low.x(); x <= high.x(); ++x)
+      for (int y = low.y(); y <= high.y(); ++y)
+        for (int z = low.z(); z <= high.z(); ++z) passes[{x, y, z}] |= surfel.label == Label::kOccupied ? 2 : 1;
+  }
+  std::vector<std::array<int, 3>> cells;
+  Points centres;
+  const Eigen::AlignedBox3f box = box_around(surfels);
+  for (float x = box.min().x() - 0.5F; x < box.max().x() + 0.5F; x += kResolution)
+    for (float y = box.min().y() - 0.5F; y < box.max().y() + 0.5F; y += kResolution)
+      for (float z = box.min().z() - 0.5F; z < box.max().z() + 0.5F; z += kResolution) {
+        const Eigen::Array3i cell = (Eigen::Array3f(x, y, z) / kResolution).floor().cast<int>();
+        cells.push_back({cell.x(), cell.y(), cell.z()});
+        centres.push_back(((cell.cast<double>() + 0.5) * kResolution).cast<float>().matrix());
+      }
+  const std::vector<SpaceState> states = mapper.states(centres);
+  std::size_t count[3] = {}, wrong = 0;
+  for (std::size_t n = 0; n < cells.size(); ++n) {
+    const auto pass = passes.find(cells[n]);
+    const SpaceState state = grid.state(centres[n]);
+    ++count[static_cast<int>(state)];
+    if (pass == passes.end())
+      wrong += (state == SpaceState::kFree) != (states[n] == SpaceState::kFree) && states[n] != SpaceState::kOccupied;
+    else
+      wrong += state != ((pass->second & 2) != 0 ? SpaceState::kOccupied : SpaceState::kUnknown);
+  }
+  EXPECT_LE(wrong, cells.size() / 10000);  // discs that touch a cell in a point, with rounding
+  for (const std::size_t some : count) EXPECT_GT(some, 500U);
+}
+
+void expect_same(const Mapper& mapper, StateGrid& grid) {
+  grid.take(mapper.state_changes(grid.sequence(), kResolution));
+  StateGrid whole(kResolution);
+  ASSERT_TRUE(whole.apply(mapper.state_changes(0, kResolution)));
+  EXPECT_EQ(grid.whole().blocks, whole.whole().blocks);
+  EXPECT_EQ(grid.sequence(), mapper.sequence());
+}
+
+TEST(MapperStateChanges, ChangesAddUpToTheWhole) {
+  const Frames frames = orbit_frames(coarse_camera(), 24, 5);
+  Mapper mapper(as_recorded());
+  StateGrid grid(kResolution);
+  std::size_t n = 0;
+  for (const auto& frame : frames) {
+    mapper.integrate(frame.view());
+    if (++n % 5 == 0) expect_same(mapper, grid);
+  }
+  EXPECT_GT(grid.whole().blocks.size(), 20U);
+  EXPECT_TRUE(grid.take(mapper.state_changes(grid.sequence(), kResolution)).blocks.size() < 20U);
+  const std::vector<Surfel> surfels = mapper.surfels();
+  mapper.reset();
+  expect_same(mapper, grid);
+  EXPECT_TRUE(grid.whole().blocks.empty());
+  mapper.integrate(frames.front().view());
+  expect_same(mapper, grid);
+  mapper.load(surfels);
+  expect_same(mapper, grid);
+  EXPECT_GT(grid.whole().blocks.size(), 20U);
+}
+
+/// What views have seen stays free in the grid when they are forgotten, where no surfel stands.
+TEST(MapperStateChanges, ForgettingIsNoChange) {
+  Config config = as_recorded();
+  config.recent_views = 3;
+  Mapper mapper(config), all(as_recorded());
+  StateGrid grid(kResolution), exact(kResolution);
+  const Frames frames = orbit_frames(coarse_camera(), 40, 5);
+  for (const auto& frame : frames) {
+    mapper.integrate(frame.view());
+    all.integrate(frame.view());
+    grid.take(mapper.state_changes(grid.sequence(), kResolution));
+  }
+  exact.take(all.state_changes(0, kResolution));
+  std::size_t different = 0, cells = 0;
+  for (const StateBlock& block : exact.whole().blocks)
+    for (int n = 0; n < StateBlock::kCells; ++n) {
+      const Eigen::Vector3f centre =
+          (Eigen::Vector3f(16 * block.block[0] + n % 16, 16 * block.block[1] + n / 16 % 16, 16 * block.block[2] + n / 256) +
+           Eigen::Vector3f::Constant(0.5F)) *
+          static_cast<float>(kResolution);
+      ++cells;
+      different += block.state(n) != grid.state(centre);
+    }
+  EXPECT_LE(different, cells / 50);
+  EXPECT_GT(cells, 10000U);
+}
+
+TEST(MapperStateChanges, SameOnAnyNumberOfThreads) {
+  std::vector<StateBlock> blocks[2];
+  for (int n = 0; n < 2; ++n) {
+    Config config = as_recorded();
+    config.threads = 1 + n;
+    Mapper mapper(config);
+    integrate_all(mapper, orbit_frames(coarse_camera(), 12, 5));
+    blocks[n] = mapper.state_changes(0, kResolution).blocks;
+  }
+  EXPECT_EQ(blocks[0], blocks[1]);
+  EXPECT_GT(blocks[0].size(), 20U);
+}
+
+TEST(MapperStateChanges, AResolutionWithoutSenseIsRefused) {
+  const Mapper mapper(as_recorded());
+  for (const double resolution : {0.001, 1.5, -0.05, std::nan("")}) EXPECT_THROW(mapper.state_changes(0, resolution), Error);
+  EXPECT_TRUE(mapper.state_changes(0, kResolution).blocks.empty());
+}
+
+}  // namespace
+}  // namespace frontier_surfels
