@@ -67,6 +67,33 @@ TEST(MapperStates, ForgottenViewsAreRememberedAwayFromTheBoundary) {
   EXPECT_GE(right, asked * 0.998) << asked - right << " of " << asked;
 }
 
+/// Deep in what is solid nothing is free, be it by kept views or by seen points, and with a Kinect's noise.
+TEST(MapperStates, SolidsAreNotFree) {
+  const replay::Room room;
+  for (const bool noise : {false, true}) {
+    replay::SensorModel sensor;
+    sensor.noise = noise;
+    Config config = as_recorded();
+    config.recent_views = 8;
+    Mapper mapper(config);
+    for (int n = 0; n < 25; ++n) mapper.integrate(room.render(8 * n, 200, working_camera(), sensor).view());
+    const Points points = random_points(100000, 7, box_around(mapper.surfels()));
+    const std::vector<SpaceState> states = mapper.states(points);
+    const double depth = noise ? 0.06 : 0.02;  // without decimation, single pixels may err by several deviations, of 1.3 cm each at 3 m
+    std::size_t deep = 0, deep_free = 0, before = 0, before_free = 0;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const double distance = room.distance(points[n].cast<double>());
+      deep += distance < -depth;
+      deep_free += distance < -depth && states[n] == SpaceState::kFree;
+      before += distance > 0.05 && distance < 0.3;
+      before_free += distance > 0.05 && distance < 0.3 && states[n] == SpaceState::kFree;
+    }
+    EXPECT_GT(deep, 3000U);
+    EXPECT_LE(deep_free, 1e-4 * deep) << "of " << deep;
+    EXPECT_GT(before_free, 0.3 * before) << "of " << before;  // the free space around is known
+  }
+}
+
 TEST(MapperStates, DoNotDependOnWidthAndThreads) {
   const Frames frames = orbit_frames(coarse_camera(), 20, 5);
   std::vector<std::vector<SpaceState>> all;
