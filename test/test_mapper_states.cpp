@@ -67,6 +67,35 @@ TEST(MapperStates, ForgottenViewsAreRememberedAwayFromTheBoundary) {
   EXPECT_GE(right, asked * 0.998) << asked - right << " of " << asked;
 }
 
+/// Deep in what is solid nothing is free, be it by kept views or by seen points, and with a Kinect's noise.
+TEST(MapperStates, SolidsAreNotFree) {
+  const replay::Room room;
+  for (const bool noise : {false, true}) {
+    replay::SensorModel sensor;
+    sensor.noise = noise;
+    Config config = as_recorded();
+    config.recent_views = 8;
+    Mapper mapper(config);
+    for (int n = 0; n < 25; ++n) mapper.integrate(room.render(8 * n, 200, working_camera(), sensor, replay::CameraPath::kExplore).view());
+    const Points points = random_points(300000, 7, box_around(mapper.surfels()));
+    const std::vector<SpaceState> states = mapper.states(points);
+    const double depth = noise ? 0.04 : 0.02;  // without decimation, single pixels may err by several deviations, of 1.3 cm each at 3 m
+    std::size_t deep = 0, deep_free = 0, shallow_free = 0, before = 0, before_free = 0;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const double distance = room.distance(points[n].cast<double>());
+      deep += distance < -depth;
+      deep_free += distance < -depth && states[n] == SpaceState::kFree;
+      shallow_free += distance < 0 && distance > -depth && states[n] == SpaceState::kFree;
+      before += distance > 0.05 && distance < 0.3;
+      before_free += distance > 0.05 && distance < 0.3 && states[n] == SpaceState::kFree;
+    }
+    EXPECT_GT(deep, 3000U);
+    EXPECT_LE(deep_free, 1e-4 * deep) << "of " << deep;
+    EXPECT_GT(shallow_free, 0U);                              // so that this test can fail
+    EXPECT_GT(before_free, 0.3 * before) << "of " << before;  // the free space around is known
+  }
+}
+
 TEST(MapperStates, DoNotDependOnWidthAndThreads) {
   const Frames frames = orbit_frames(coarse_camera(), 20, 5);
   std::vector<std::vector<SpaceState>> all;
@@ -107,6 +136,25 @@ TEST(MapperStates, AnywhereInTheWorld) {
     EXPECT_EQ(states, (std::vector<SpaceState>{SpaceState::kUnknown, SpaceState::kFree, SpaceState::kFree, SpaceState::kOccupied,
                                                SpaceState::kUnknown, SpaceState::kUnknown, SpaceState::kUnknown, SpaceState::kUnknown}));
   }
+}
+
+/// A loaded surfel may reach beyond the blocks around its own, whichever points are asked together.
+TEST(MapperStates, LargeSurfelsReachFar) {
+  Surfel surfel;
+  surfel.position = {0.3F, 0.2F, 0.1F};
+  surfel.radius = 1;
+  surfel.label = Label::kOccupied;
+  Mapper mapper(as_recorded());
+  mapper.load({surfel});
+  Points within, beyond;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float sign : {-1.0F, 1.0F}) {
+      within.push_back(surfel.position + sign * 1.1F * Eigen::Vector3f::Unit(axis));
+      beyond.push_back(surfel.position + sign * 1.2F * Eigen::Vector3f::Unit(axis));
+    }
+  EXPECT_EQ(mapper.states(within), std::vector<SpaceState>(within.size(), SpaceState::kOccupied));
+  EXPECT_EQ(mapper.states(beyond), std::vector<SpaceState>(beyond.size(), SpaceState::kUnknown));
+  for (const Eigen::Vector3f& point : within) EXPECT_EQ(mapper.states({point}).front(), SpaceState::kOccupied);
 }
 
 TEST(MapperStates, OfAnEmptyMapAndOfNoPoints) {

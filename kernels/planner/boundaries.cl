@@ -68,9 +68,15 @@ __kernel void list_by_cells(const Window window, const int cells, __global const
 
 // The nearest surfel so far.
 typedef struct {
-  float square;  // of its distance [m^2]
-  uint slot;     // UINT_MAX: none. Of surfels at the same distance, the lowest slot
+  float square;     // of its distance [m^2]
+  uint slot;        // UINT_MAX: none. Of surfels at the same distance, the lowest slot
+  float3 position;  // if there is one
 } Nearest;
+
+INLINE float square_distance(float3 p, float3 surfel) {
+  const float3 d = surfel - p;
+  return d.x * d.x + (d.y * d.y + d.z * d.z);
+}
 
 // Distance from p to the cells with number n along an axis [m]. Rounding cannot make it more than that of a surfel in them.
 INLINE float distance_to_cells(float p, int n, float edge) { return fmax(fmax((float)n * edge - p, p - (float)(n + 1) * edge), 0.0f); }
@@ -88,16 +94,19 @@ INLINE void look_along_row(const Cells* cells, __global const float4* entries, _
   const int row = first_cell_of_row(cells, j, k);
   for (uint at = cell_begin[row + low]; at < cell_begin[row + high + 1]; ++at) {
     const float4 entry = entries[at];
-    const float3 d = entry.xyz - p;
-    const float square = d.x * d.x + (d.y * d.y + d.z * d.z);
+    const float square = square_distance(p, entry.xyz);
     const uint slot = as_uint(entry.w);
-    if (square < nearest->square || (square == nearest->square && slot < nearest->slot)) *nearest = (Nearest){square, slot};
+    if (square < nearest->square || (square == nearest->square && slot < nearest->slot)) *nearest = (Nearest){square, slot, entry.xyz};
   }
 }
 
 // Rows of cells come in rings around that of the point, until the next ring is farther than the nearest surfel.
-Nearest nearest_surfel(const Cells* cells, __global const float4* entries, __global const uint* cell_begin, float3 p, float reach) {
-  Nearest nearest = {reach * reach, UINT_MAX};
+//   guess: the answer for a point near by. It only decides how long this takes
+Nearest nearest_surfel(const Cells* cells, __global const float4* entries, __global const uint* cell_begin, float3 p, float reach,
+                       const Nearest* guess) {
+  Nearest nearest = *guess;
+  nearest.square = square_distance(p, guess->position);
+  if (guess->slot == UINT_MAX || nearest.square > reach * reach) nearest = (Nearest){reach * reach, UINT_MAX, p};
   const int2 at = convert_int2(floor(p.yz * cells->scale));
   const int rings = max(max(at.x, cells->count.y - 1 - at.x), max(at.y, cells->count.z - 1 - at.y));
   for (int ring = 0; ring <= rings; ++ring) {
@@ -113,7 +122,7 @@ Nearest nearest_surfel(const Cells* cells, __global const float4* entries, __glo
   return nearest;
 }
 
-// One work item handles LANES points: which surfel is the nearest to each, within reach [m]?
+// One work item handles LANES points, which should lie near each other: which surfel is the nearest to each, within reach [m]?
 //   in  points[3][stride]: as in states.cl
 //   out distances[count] [m], slots[count]: of the surfels, UINT_MAX for none;  sides[count]: BOUNDARY_IN_FRONT | BOUNDARY_OCCUPIED
 __kernel void find_nearest_boundaries(const Window window, const int cells, const float reach, __global const uint4* surfels,
@@ -125,10 +134,11 @@ __kernel void find_nearest_boundaries(const Window window, const int cells, cons
   const Cells c = cells_of_window(&window, cells);
   uint found[LANES];
   for (int m = 0; m < LANES; ++m) found[m] = 0;
+  Nearest nearest = {0.0f, UINT_MAX, (float3)(0.0f)};
   for (int m = 0; m < own; ++m) {
     const int at = first + m;
-    const Nearest nearest =
-        nearest_surfel(&c, entries, cell_begin, (float3)(points[at], points[stride + at], points[2 * stride + at]), reach);
+    const float3 p = (float3)(points[at], points[stride + at], points[2 * stride + at]);
+    nearest = nearest_surfel(&c, entries, cell_begin, p, reach, &nearest);
     distances[at] = sqrt(nearest.square);
     slots[at] = nearest.slot;
     if (nearest.slot != UINT_MAX) found[m] = nearest.slot;

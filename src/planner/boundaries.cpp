@@ -1,5 +1,7 @@
 #include "planner/boundaries.hpp"
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -16,8 +18,21 @@ void check(const std::vector<Eigen::Vector3f>& points, double reach) {
   if (!(reach >= 0.001 && reach <= 5)) throw Error("The reach is " + to_text(reach) + " m: it must be from 0.001 to 5 m.");
   if (static_cast<double>(points.size()) > kMostAsked)
     throw Error(std::to_string(points.size()) + " points are asked for at once: at most 100 million can be.");
-  for (std::size_t n = 0; n < points.size(); ++n)
-    if (!points[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that nothing is near it.");
+}
+
+/// Numbers of points in an order in which most are near the ones before and after them.
+std::vector<std::uint32_t> by_nearness(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked) {
+  constexpr float kPerMetre = 8;
+  std::vector<std::pair<std::array<int, 3>, std::uint32_t>> places;
+  places.reserve(asked.size());
+  for (const std::uint32_t n : asked) {
+    const Eigen::Array3i at = (kPerMetre * points[n].array()).floor().cast<int>();
+    places.push_back({{at.z(), at.y(), at.x()}, n});
+  }
+  std::sort(places.begin(), places.end());
+  std::vector<std::uint32_t> numbers;
+  for (const auto& [place, n] : places) numbers.push_back(n);
+  return numbers;
 }
 
 cl_float4 to_float4(const Eigen::Vector3d& v) {
@@ -39,7 +54,8 @@ Boundaries::Boundaries(Commands& commands, Lists& lists)
 std::vector<NearestBoundary> Boundaries::nearest(const std::vector<Eigen::Vector3f>& points_world, double reach, const SurfelMap& map) {
   check(points_world, reach);
   std::vector<NearestBoundary> nearest(points_world.size());
-  for (const auto& [region, asked] : by_region(points_world, map.block_size())) {
+  for (const auto& [region, in_region] : by_region(points_world, map.block_size(), "nothing is near it.")) {
+    const std::vector<std::uint32_t> asked = by_nearness(points_world, in_region);
     Eigen::AlignedBox3d box;
     for (const std::uint32_t n : asked) box.extend(points_world[n].cast<double>());
     cells_.list({box.min().array() - reach, box.max().array() + reach}, map);
@@ -73,7 +89,7 @@ std::vector<FirstSurfel> Boundaries::first_within(const std::vector<MovingBox>& 
   std::vector<FirstSurfel> first(boxes.size());
   std::vector<Eigen::Vector3f> starts;
   for (const MovingBox& box : boxes) starts.push_back(box.from);
-  for (const auto& [region, asked] : by_region(starts, map.block_size())) {
+  for (const auto& [region, asked] : by_region(starts, map.block_size(), "no box is there.")) {
     Eigen::AlignedBox3d around;
     for (const std::uint32_t n : asked)
       for (const Eigen::Vector3f& end : {boxes[n].from, boxes[n].to}) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kLargest = 20;  // edge of a box [m]
 constexpr std::size_t kPointsAtOnce = std::size_t{1} << 20;
-constexpr std::size_t kPositionsAtOnce = 64;  // of a box on its path: many are stopped early
+constexpr std::size_t kPositionsAtOnce = 16;  // of a box on its path: many are stopped early
 constexpr double kFarthestAtOnce = 4;         // they may go so far, or one step [m]
 constexpr double kMostPositions = 1e6;        // of a path
 

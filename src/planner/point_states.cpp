@@ -79,9 +79,8 @@ PointStates::PointStates(Commands& commands)
 
 std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world, bool with_surfels) {
   std::vector<SpaceState> states(points_world.size(), SpaceState::kUnknown);
-  for (std::size_t n = 0; n < points_world.size(); ++n)
-    if (!points_world[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that it has no state.");
-  for (const auto& [region, asked] : by_region(points_world, world.map.block_size())) find_some(points_world, asked, world, with_surfels, states);
+  for (const auto& [region, asked] : by_region(points_world, world.map.block_size(), "it has no state."))
+    find_some(points_world, asked, world, with_surfels, states);
   return states;
 }
 

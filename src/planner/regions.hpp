@@ -4,8 +4,10 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
+#include "frontier_surfels/types.hpp"
 #include "map/block_key.hpp"
 
 namespace frontier_surfels {
@@ -20,13 +22,16 @@ inline BlockKey block_at(const Eigen::Vector3d& point_world, double block_size) 
   return {at.x(), at.y(), at.z()};
 }
 
-/// Numbers of the points in each region, ascending. Points beyond the map, or not finite, are left out.
-inline std::map<BlockKey, std::vector<std::uint32_t>> by_region(const std::vector<Eigen::Vector3f>& points_world, double block_size) {
+/// Numbers of the points in each region, ascending. Points beyond the map are left out.
+/// @param consequence  end of the sentence for a point that is not finite. @throws Error  there is such a point
+inline std::map<BlockKey, std::vector<std::uint32_t>> by_region(const std::vector<Eigen::Vector3f>& points_world, double block_size,
+                                                                const std::string& consequence) {
   std::map<BlockKey, std::vector<std::uint32_t>> regions;
   BlockKey last = {};
   std::vector<std::uint32_t>* numbers = nullptr;
   for (std::uint32_t n = 0; n < points_world.size(); ++n) {
-    if (!(points_world[n].cwiseAbs().maxCoeff() <= kFarthest) || !points_world[n].allFinite()) continue;
+    if (!points_world[n].allFinite()) throw Error("Point " + std::to_string(n) + " is not finite, so that " + consequence);
+    if (points_world[n].cwiseAbs().maxCoeff() > kFarthest) continue;
     const BlockKey region = block_at(points_world[n].cast<double>(), kRegionBlocks * block_size);
     if (numbers == nullptr || region != last) numbers = &regions[region];
     last = region;

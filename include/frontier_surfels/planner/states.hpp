@@ -27,7 +27,7 @@ struct RayState {
 };
 
 /// The boundary of known space near a point: the surfel whose centre is nearest. Which side of it the point is on is not its state: near
-/// the rims of sheets of frontier, a free point may be behind a surfel that looks past it.
+/// the rims of sheets and at edges, a free point may be behind a surfel that looks past it.
 struct NearestBoundary {
   static constexpr std::uint32_t kNone = 0xffffffff;
 
