@@ -1,8 +1,10 @@
 #include "synthetic/world.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "scoring/parallel.hpp"
 
@@ -83,6 +85,7 @@ void World::build(int begin, int end) {
   }
   int axis = 0;
   centres.sizes().maxCoeff(&axis);
+  nodes_[index].axis = axis;
   std::sort(order_.begin() + begin, order_.begin() + end, [&](int a, int b) {
     const double at_a = solids_[static_cast<std::size_t>(a)].centre[axis], at_b = solids_[static_cast<std::size_t>(b)].centre[axis];
     return at_a < at_b || (at_a == at_b && a < b);
@@ -106,8 +109,9 @@ World::Nearest World::nearest(const Vector3d& origin, const Vector3d& direction,
     const Node& node = nodes_[static_cast<std::size_t>(index)];
     if (!meets(node.box, origin, inverse_direction, found.t)) continue;
     if (node.solids == 0) {
-      waiting[count++] = node.second;
-      waiting[count++] = index + 1;
+      const bool forwards = direction[node.axis] > 0;  // the half that the ray meets first is visited first
+      waiting[count++] = forwards ? node.second : index + 1;
+      waiting[count++] = forwards ? index + 1 : node.second;
       continue;
     }
     for (int i = node.first_solid; i < node.first_solid + node.solids; ++i) {

@@ -64,6 +64,7 @@ class World {
   struct Node {
     Eigen::AlignedBox3d box;
     int second = 0;
+    int axis = 0;                     ///< along which the halves lie, the next node first
     int first_solid = 0, solids = 0;  ///< in order_; none: an inner node
   };
   struct Nearest {
