@@ -45,8 +45,8 @@ endif()
   endif()
   find_package(catkin REQUIRED COMPONENTS cv_bridge diagnostic_updater geometry_msgs image_geometry image_transport message_generation
     nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs visualization_msgs ${tools_need})
-  add_message_files(FILES FrameReport.msg SurfelUpdate.msg)
-  add_service_files(FILES GetSurfels.srv MapFile.srv)
+  add_message_files(FILES Coverage.msg FrameReport.msg SurfelUpdate.msg)
+  add_service_files(FILES GetSurfels.srv MapFile.srv MoveCamera.srv)
   generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
   catkin_package(
     INCLUDE_DIRS include
