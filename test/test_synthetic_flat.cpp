@@ -58,6 +58,11 @@ TEST(Flat, AllRoomsCanBeReached) {
     EXPECT_GT(flat.distance(room), kRadius);
     EXPECT_TRUE(lattice.any_near(room, 0.3, [&](const Vector3d& p) { return flat.sees(p, room); })) << room.transpose();
   }
+  EXPECT_EQ(flat_starts().size(), 5U);
+  for (const Eigen::Isometry3d& start : flat_starts()) {
+    EXPECT_GT(flat.distance(start.translation()), kRadius);
+    EXPECT_TRUE(lattice.any_near(start.translation(), 0.3, [&](const Vector3d& p) { return flat.sees(p, start.translation()); }));
+  }
   for (const Vector3d& p : lattice.positions()) {
     ASSERT_GE(flat.distance(p), kRadius);
     ASSERT_TRUE(box.contains(p));

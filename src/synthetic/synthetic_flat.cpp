@@ -1,5 +1,6 @@
 #include "synthetic/synthetic_flat.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace frontier_surfels::replay {
@@ -179,6 +180,19 @@ World synthetic_flat() {
 
 Eigen::AlignedBox3d flat_bounds() { return {Vector3d::Zero(), Vector3d(kLength, kDepth, kHeight)}; }
 
-Eigen::Isometry3d flat_start() { return Eigen::Isometry3d(Eigen::Translation3d(0.8, 3.95, 1.2)); }
+std::vector<Eigen::Isometry3d> flat_starts() {
+  std::vector<Eigen::Isometry3d> starts;
+  const auto add = [&](double x, double y, double yaw) {
+    starts.push_back(Eigen::Translation3d(x, y, 1.2) * Eigen::Isometry3d(Eigen::AngleAxisd(yaw, Vector3d::UnitZ())));
+  };
+  add(0.8, 3.95, 0);
+  add(3.0, 2.6, -M_PI / 2);
+  add(8.6, 1.5, M_PI);
+  add(2.8, 5.6, M_PI / 2);
+  add(7.6, 6.4, -M_PI / 4);
+  return starts;
+}
+
+Eigen::Isometry3d flat_start() { return flat_starts().front(); }
 
 }  // namespace frontier_surfels::replay

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "synthetic/world.hpp"
 
@@ -15,7 +16,11 @@ World synthetic_flat();
 /// The space within the outer walls, floor and ceiling.
 Eigen::AlignedBox3d flat_bounds();
 
-/// A place for a camera at the corridor's west end, 1.2 m high, looking along the corridor: body frame (x forward, y left, z up).
+/// Places for a camera to start, 1.2 m high: in the corridor, looking along it, and in living room, kitchen, bedroom and study. Body frame
+/// (x forward, y left, z up).
+std::vector<Eigen::Isometry3d> flat_starts();
+
+/// The first of them.
 Eigen::Isometry3d flat_start();
 
 }  // namespace frontier_surfels::replay

@@ -59,7 +59,8 @@ SimulationRos::SimulationRos(const ros::NodeHandle& nh, const ros::NodeHandle& p
       config_(read(pnh)),
       flat_(replay::synthetic_flat()),
       camera_(flat_, config_.start(), config_.camera()),
-      coverage_(flat_, replay::flat_bounds(), config_.start().translation(), config_.coverage()) {
+      // What can be seen at all is the same for all starts, so that shares can be compared.
+      coverage_(flat_, replay::flat_bounds(), replay::flat_start().translation(), config_.coverage()) {
   for_each_simulation_field(config_, [this](const FieldInfo& info, const auto& value) { pnh_.setParam(info.name, value); });
   advertise();
   ROS_INFO("The simulated camera is ready: %zu points of the flat can be seen.", coverage_.points().size());
