@@ -10,7 +10,7 @@ set(POCL_CACHE ${CMAKE_CURRENT_BINARY_DIR}/pocl_cache)
 file(MAKE_DIRECTORY ${POCL_CACHE})
 
 # Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
-set(NEED_TOOLS "/(ros/test_.*|test_(exact_test|folder_source|mapper|object|octomap_truth|real_data|sampling|summary|synthetic|tools|truth).*)\\.cpp$")
+set(NEED_TOOLS "/(ros/test_.*|test_(coverage|exact_test|folder_source|mapper|object|octomap_truth|real_data|sampling|summary|synthetic|tools|truth).*)\\.cpp$")
 # These of ROS need only the node's library: ThreadSanitizer's build of them is then half as large.
 set(NEED_NO_RECORDINGS "/ros/test_(inbox|map_publisher|worker)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)

@@ -53,3 +53,11 @@ file(GLOB BENCH_SOURCES CONFIGURE_DEPENDS src/bench/*.cpp)
 add_executable(bench ${BENCH_SOURCES})
 target_link_libraries(bench PRIVATE frontier_surfels_replay CLI11::CLI11 benchmark::benchmark)
 list(APPEND PROGRAMS bench)
+
+# A depth camera in the synthetic flat, as a node.
+if(FRONTIER_SURFELS_WITH_ROS)
+  file(GLOB SIMULATION_SOURCES CONFIGURE_DEPENDS src/ros/simulation/*.cpp)
+  add_executable(simulated_camera ${SIMULATION_SOURCES})
+  target_link_libraries(simulated_camera PRIVATE frontier_surfels_replay)
+  list(APPEND PROGRAMS simulated_camera)
+endif()

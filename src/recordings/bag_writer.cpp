@@ -84,18 +84,6 @@ sensor_msgs::CompressedImage to_jpeg(const cv::Mat& color) {
   return message;
 }
 
-sensor_msgs::CameraInfo to_camera_info(const Intrinsics& intrinsics) {
-  sensor_msgs::CameraInfo info;
-  info.width = static_cast<std::uint32_t>(intrinsics.width);
-  info.height = static_cast<std::uint32_t>(intrinsics.height);
-  info.distortion_model = "plumb_bob";
-  info.D.assign(5, 0.0);
-  info.K = {intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1};
-  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  info.P = {intrinsics.fx, 0, intrinsics.cx, 0, 0, intrinsics.fy, intrinsics.cy, 0, 0, 0, 1, 0};
-  return info;
-}
-
 struct Link {
   const char* parent;
   const char* child;
@@ -167,7 +155,7 @@ class Writer {
     } else {
       publish(options_.depth_topic, *cv_bridge::CvImage(std_msgs::Header(), options_.encoding, depth).toImageMsg(), stamp);
     }
-    publish(options_.depth_info_topic, to_camera_info(frame.intrinsics), stamp);
+    publish(options_.depth_info_topic, messages::to_camera_info(frame.intrinsics), stamp);
   }
 
   void write_color(const RecordedFrame& frame, const ros::Time& stamp) {
@@ -176,7 +164,7 @@ class Writer {
     } else {
       publish(options_.color_topic, *cv_bridge::CvImage(std_msgs::Header(), encodings::BGR8, frame.color).toImageMsg(), stamp);
     }
-    publish(options_.color_info_topic, to_camera_info(frame.intrinsics), stamp);
+    publish(options_.color_info_topic, messages::to_camera_info(frame.intrinsics), stamp);
   }
 
   template <typename Message>

@@ -1,4 +1,4 @@
-/// The arguments of the node and of the nodelet.
+/// The arguments of the nodes and of the nodelet.
 #pragma once
 
 #include <string>
@@ -6,8 +6,9 @@
 
 namespace frontier_surfels {
 
-/// What is wrong with arguments, as a sentence; empty if there are none. The mapper has no arguments of its own.
+/// What is wrong with arguments, as a sentence; empty if there are none. The nodes have no arguments of their own.
 /// @param arguments  without the program's name, and without those that ROS takes out: NAME:=VALUE
-std::string fault_of_arguments(const std::vector<std::string>& arguments);
+/// @param program    whose --help lists what there is
+std::string fault_of_arguments(const std::vector<std::string>& arguments, const std::string& program = "mapper_node");
 
 }  // namespace frontier_surfels

@@ -2,34 +2,16 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
 #include "recordings/frame_source.hpp"
 #include "synthetic/synthetic_scenes.hpp"
+#include "synthetic/world.hpp"
 
 namespace frontier_surfels::replay {
-
-/// A visible object. z points up.
-struct Solid {
-  enum class Shape { kBox, kCylinder, kSphere };  // boxes have their edges along the axes, cylinders stand upright
-  Shape shape = Shape::kBox;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();     ///< [m]
-  Eigen::Vector3d half_size = Eigen::Vector3d::Zero();  ///< of the bounding box [m]
-  std::array<std::uint8_t, 3> rgb = {0, 0, 0};
-  double tile = 0;  ///< edge of the tiles of a chequered pattern [m]; 0: plain
-};
-
-/// Where a ray meets the first surface.
-struct RayHit {
-  double distance = 0;                               ///< in multiples of the length of the direction vector
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit length, points out of the solid
-  std::array<std::uint8_t, 3> rgb = {0, 0, 0};
-};
 
 /// The errors of a depth sensor, and of its poses.
 struct SensorModel {
@@ -62,26 +44,13 @@ struct SensedFrame {
 
 /// 4 x 5 x 2.5 m with a table, a chair, a shelf, a sofa, a cupboard, round things, and an open door to a corridor. A ray
 /// from inside always meets a surface.
-class Room {
+class Room : public World {
  public:
   /// @param frames  number of frames of the whole recording, which says when things come and go
   explicit Room(Scene scene = Scene::kRoom, int frames = 0);
 
-  const std::vector<Solid>& solids() const { return solids_; }
+  /// The things that come and go. Only the images below show them, not what the World says.
   const std::vector<SceneThing>& things() const { return things_; }
-
-  // Only images show the things that come and go.
-
-  /// The first surface that a ray from free space meets, if any.
-  std::optional<RayHit> cast(const Eigen::Vector3d& origin_world, const Eigen::Vector3d& direction_world) const;
-
-  /// Exact depth along the optical axis at a point of the image [m]; +Inf if the ray meets nothing.
-  double depth(const Eigen::Isometry3d& T_world_camera, const Intrinsics& intrinsics, double u, double v) const;
-
-  /// Signed distance to the nearest surface [m]; negative in a solid. Exact in free space.
-  double distance(const Eigen::Vector3d& p_world) const;
-
-  bool inside_solid(const Eigen::Vector3d& p_world) const { return distance(p_world) < 0; }
 
   /// The exact view of frame `index` of `frames` along a path, with depth as CV_32FC1 [m] and with colour. There are 30 frames a second.
   RecordedFrame render(int index, int frames, const Intrinsics& intrinsics, CameraPath path = CameraPath::kOrbit) const;
@@ -94,7 +63,6 @@ class Room {
   SensedFrame sense(int index, int frames, const Intrinsics& intrinsics, const SensorModel& sensor, CameraPath path) const;
 
  private:
-  std::vector<Solid> solids_;
   std::vector<SceneThing> things_;
 };
 

@@ -227,6 +227,18 @@ Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& im
   return intrinsics;
 }
 
+sensor_msgs::CameraInfo to_camera_info(const Intrinsics& intrinsics) {
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(intrinsics.width);
+  info.height = static_cast<std::uint32_t>(intrinsics.height);
+  info.distortion_model = "plumb_bob";
+  info.D.assign(5, 0.0);
+  info.K = {intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {intrinsics.fx, 0, intrinsics.cx, 0, 0, intrinsics.fy, intrinsics.cy, 0, 0, 0, 1, 0};
+  return info;
+}
+
 Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
   const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z);
   const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);

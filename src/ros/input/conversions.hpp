@@ -61,6 +61,9 @@ Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info);
 /// The same for a depth image of `image_size` pixels. @throws BadFrame also if the message states another size
 Intrinsics to_intrinsics(const sensor_msgs::CameraInfo& info, const cv::Size& image_size);
 
+/// The message of a pinhole camera without distortion, without its header.
+sensor_msgs::CameraInfo to_camera_info(const Intrinsics& intrinsics);
+
 /// A rigid transform; the quaternion is normalised. @throws BadFrame if it is not finite, or the quaternion is 0
 Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
 Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose);

@@ -1,0 +1,55 @@
+/// simulated_camera: a depth camera in the synthetic flat, as a node.
+#include <ros/console.h>
+#include <ros/init.h>
+#include <ros/node_handle.h>
+
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "ros/arguments.hpp"
+#include "ros/simulation/simulation_ros.hpp"
+
+namespace {
+
+constexpr char kHelp[] =
+    R"(A depth camera in a synthetic flat of five rooms and a corridor. It goes where it is told, but not through solids.
+
+usage: rosrun frontier_surfels simulated_camera [TOPIC:=OTHER_TOPIC ...] [_PARAMETER:=VALUE ...]
+
+subscribes  ~goal: pose of the body (x forward, z up) in the world frame
+publishes   depth/image, depth/camera_info, tf; ~coverage: how much has been seen of what can be seen at all
+services    ~move: to a pose, with an answer; ~capture: one more image from where the camera is
+
+Parameters, in the node's private namespace:
+)";
+
+bool is_help(const std::string& argument) { return argument == "--help" || argument == "-h"; }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace frontier_surfels;
+  if (std::any_of(argv + 1, argv + argc, is_help)) {
+    std::cout << kHelp << simulation_parameter_table();
+    return 0;
+  }
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  arguments.erase(arguments.begin());
+  if (const std::string fault = fault_of_arguments(arguments, "simulated_camera"); !fault.empty()) {
+    std::cerr << fault << std::endl;
+    return 2;
+  }
+  ros::init(argc, argv, "simulated_camera");
+  const ros::NodeHandle nh, pnh("~");  // must outlive the camera: without a node handle the error below would not be logged
+  try {
+    SimulationRos simulation(nh, pnh);
+    ros::spin();
+    return 0;
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
+}
