@@ -22,12 +22,14 @@ TEST(MapperStateChanges, CellsAgainstPointsAndSurfels) {
       for (int y = low.y(); y <= high.y(); ++y)
         for (int z = low.z(); z <= high.z(); ++z) passes[{x, y, z}] |= surfel.label == Label::kOccupied ? 2 : 1;
   }
+  std::mt19937 random(1);
   std::vector<std::array<int, 3>> cells;
   Points centres;
   const Eigen::AlignedBox3f box = box_around(surfels);
   for (float x = box.min().x() - 0.5F; x < box.max().x() + 0.5F; x += kResolution)
     for (float y = box.min().y() - 0.5F; y < box.max().y() + 0.5F; y += kResolution)
       for (float z = box.min().z() - 0.5F; z < box.max().z() + 0.5F; z += kResolution) {
+        if (random() % 8 != 0) continue;
         const Eigen::Array3i cell = (Eigen::Array3f(x, y, z) / kResolution).floor().cast<int>();
         cells.push_back({cell.x(), cell.y(), cell.z()});
         centres.push_back(((cell.cast<double>() + 0.5) * kResolution).cast<float>().matrix());
@@ -65,7 +67,8 @@ TEST(MapperStateChanges, ChangesAddUpToTheWhole) {
     if (++n % 5 == 0) expect_same(mapper, grid);
   }
   EXPECT_GT(grid.whole().blocks.size(), 20U);
-  EXPECT_TRUE(grid.take(mapper.state_changes(grid.sequence(), kResolution)).blocks.size() < 20U);
+  expect_same(mapper, grid);
+  EXPECT_TRUE(mapper.state_changes(grid.sequence(), kResolution).blocks.empty());
   const std::vector<Surfel> surfels = mapper.surfels();
   mapper.reset();
   expect_same(mapper, grid);

@@ -219,7 +219,9 @@ TEST_F(TestStateGrid, Clearance) {
     if (nearest >= 0.3 - 1e-6) continue;
     ASSERT_NEAR(boundary.distance, nearest, 1e-5);
     ASSERT_EQ(boundary.in_front, is_free);
-    if (!is_free) ASSERT_EQ(boundary.label == Label::kOccupied, slow.state(p) == SpaceState::kOccupied);
+    if (!is_free) {
+      ASSERT_EQ(boundary.label == Label::kOccupied, slow.state(p) == SpaceState::kOccupied);
+    }
   }
   EXPECT_GT(free, 50);
   EXPECT_EQ(grid.clearance(Eigen::Vector3f::Zero(), -1), 0);
