@@ -10,6 +10,7 @@
 
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/planner/states.hpp"
+#include "frontier_surfels/planner/views.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -52,6 +53,11 @@ class Mapper {
   /// `step` [m] apart, or a little less.
   /// @throws Error  an end is not finite, a ray has more than a million points, or the step is not from 0.0001 to 10 m
   std::vector<RayState> ray_states(const std::vector<Ray>& rays_world, bool stop_at_unknown, double step = 0.01) const;
+
+  /// What a camera would see of the map from poses that it has not been to, in the order of the poses. With a map_folder: of what is in
+  /// memory. Where surfels are smaller than a pixel, merged ones stand for them.
+  /// @throws Error  names the field of the question that makes no sense: views.hpp has the limits
+  std::vector<ViewValue> evaluate_views(const ViewQuestion& question) const;
 
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;

@@ -103,6 +103,7 @@ class SurfelMap {
   /// @throws BadFrame  the grid is far too large for its range
   double window_reach(const Grid& grid, const Eigen::Isometry3d& T_world_camera) const;
 
+  double largest_radius() const { return largest_radius_; }  ///< no surfel of the map is larger [m]
   const BlockIndex& index() const { return index_; }
   std::vector<BlockKey> blocks_changed_since(std::uint32_t frame) const;  ///< sorted
   std::vector<StoredBlock> read_blocks(const std::vector<BlockKey>& blocks) const;

@@ -12,6 +12,8 @@
 namespace frontier_surfels {
 namespace {
 
+constexpr double kFarAway = 1e9;  // [m] nothing is mapped there: positions become floats
+
 /// Runs work on the device. An exception of OpenCL's becomes one of this library's errors.
 template <typename Work>
 auto on_device(Work work) -> decltype(work()) {
@@ -79,6 +81,21 @@ std::vector<SpaceState> Mapper::Impl::states(const std::vector<Eigen::Vector3f>&
   begin_call();
   remember_forgotten();
   return point_states.find(points_world, {views, seen, taking_back, map, config.seen_points});
+}
+
+std::vector<ViewValue> Mapper::evaluate_views(const ViewQuestion& question) const {
+  check_question(question);
+  return on_device([&] { return impl_->evaluate_views(question); });
+}
+
+std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question) {
+  std::vector<Eigen::Vector3f> positions;
+  for (const Eigen::Isometry3d& T : question.T_world_camera)
+    positions.push_back(T.translation().cwiseMax(-kFarAway).cwiseMin(kFarAway).cast<float>());
+  const std::vector<SpaceState> found = states(positions);
+  std::vector<ViewValue> values = view_values.find(question, map);
+  for (std::size_t n = 0; n < values.size(); ++n) values[n].state = found[n];
+  return values;
 }
 
 std::vector<Surfel> Mapper::whole_map() const {

@@ -18,6 +18,7 @@
 #include "map/surfel_map.hpp"
 #include "opencl/commands.hpp"
 #include "planner/point_states.hpp"
+#include "planner/view_values.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
@@ -51,7 +52,8 @@ struct Mapper::Impl {
         list(commands, lists),
         creation(commands, lists),
         remembering(commands),
-        point_states(commands) {
+        point_states(commands),
+        view_values(commands) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
@@ -74,6 +76,7 @@ struct Mapper::Impl {
   void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
   std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
+  std::vector<ViewValue> evaluate_views(const ViewQuestion& question);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
   void load_views(const std::vector<SavedView>& saved);
@@ -101,7 +104,9 @@ struct Mapper::Impl {
   Creation creation;
   Remembering remembering;
 
+  // Questions of planners
   PointStates point_states;
+  ViewValues view_values;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken
