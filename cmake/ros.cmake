@@ -45,8 +45,8 @@ endif()
   endif()
   find_package(catkin REQUIRED COMPONENTS cv_bridge diagnostic_updater geometry_msgs image_geometry image_transport message_generation
     nav_msgs nodelet roscpp rosgraph_msgs sensor_msgs std_msgs std_srvs tf2 tf2_msgs visualization_msgs ${tools_need})
-  add_message_files(FILES ClusterViewpoint.msg Coverage.msg FrameReport.msg FrontierCluster.msg FrontierClusters.msg StatesUpdate.msg
-    SurfelUpdate.msg ViewValue.msg)
+  add_message_files(FILES Coverage.msg FrameReport.msg FrontierCluster.msg FrontierClusterArray.msg StatesUpdate.msg
+    SurfelUpdate.msg ViewResult.msg Viewpoint.msg)
   add_service_files(FILES CastRays.srv EvaluateViews.srv GetStateGrid.srv GetStates.srv GetSurfels.srv MapFile.srv MoveCamera.srv)
   generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
   catkin_package(

@@ -11,6 +11,7 @@
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/planner/state_grid.hpp"
 #include "frontier_surfels/planner/states.hpp"
+#include "frontier_surfels/planner/views.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels {
@@ -85,6 +86,11 @@ class Mapper {
   /// blocks go to the map folder, counts as no change. StateGrid::take() tells what is different. @param resolution  edge of a cell [m]
   /// @throws Error  the resolution is not from 0.02 to 1 m
   StateChanges state_changes(std::uint64_t since, double resolution) const;
+
+  /// What a camera would see of the map from poses that it has not been to, in the order of the poses. With a map_folder: of what is in
+  /// memory. Where surfels are smaller than a pixel, merged ones stand for them.
+  /// @throws Error  names the field of the question that makes no sense: views.hpp has the limits
+  std::vector<ViewValue> evaluate_views(const ViewQuestion& question) const;
 
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;

@@ -168,6 +168,29 @@ typedef struct {
   uintv x, y, z, w;
 } Quads;
 
+// A square of LANES pixels of an image, row by row: SQUARE along its edge.
+//   row: pixels from one row of the image to the next
+#if LANES == 16
+#define SQUARE 4
+INLINE intv square_columns(void) { return lane_numbers() & 3; }
+INLINE intv square_rows(void) { return lane_numbers() >> 2; }
+INLINE uintv load_square(__global const uint* from, int row) {
+  return (uint16)(vload4(0, from), vload4(0, from + row), vload4(0, from + 2 * row), vload4(0, from + 3 * row));
+}
+INLINE void store_square(uintv values, __global uint* to, int row) {
+  vstore4(values.lo.lo, 0, to);
+  vstore4(values.lo.hi, 0, to + row);
+  vstore4(values.hi.lo, 0, to + 2 * row);
+  vstore4(values.hi.hi, 0, to + 3 * row);
+}
+#else
+#define SQUARE 1
+INLINE intv square_columns(void) { return 0; }
+INLINE intv square_rows(void) { return 0; }
+INLINE uintv load_square(__global const uint* from, int row) { return *from; }
+INLINE void store_square(uintv values, __global uint* to, int row) { *to = values; }
+#endif
+
 #if LANES == 16
 INLINE Quads transposed(uint16 a, uint16 b, uint16 c, uint16 d) {
   return (Quads){(uint16)(a.s048c, b.s048c, c.s048c, d.s048c), (uint16)(a.s159d, b.s159d, c.s159d, d.s159d),

@@ -149,6 +149,26 @@ namespace frontier_surfels {
 #define STATE_CUBE 4
 #define STATE_CHUNK 64
 
+// Values of views, for planners - ours. Far surfels are merged by cells of the map's blocks: MERGE_CELLS_FINE along a block's edge, or
+// half as many.
+#define MERGE_CELLS_FINE 32
+#define MERGE_SUM_WORDS 12  // of a cell's sums
+
+// A pixel of such a view: depth | back | frontier | slope, see planner/view_values.cl. Nothing nearer than VIEW_NEAR is seen [m].
+#define VIEW_NEAR 0.0078125f
+#define VIEW_NOTHING 0xffffffffu
+
+// Areas are summed in steps of 1 / VIEW_AREA_ONE, which makes them the same in any order; a surface that is seen at a smaller slope than
+// VIEW_LEAST_SLOPE counts as if it had this one.
+#define VIEW_AREA_ONE 16777216.0f
+#define VIEW_LEAST_SLOPE 0.05f
+
+// Numbers of pixels of a row.
+#define VIEW_COUNT_FRONTIER 0
+#define VIEW_COUNT_OCCUPIED 1
+#define VIEW_COUNT_NOTHING 2
+#define VIEW_COUNTS 3
+
 // Names of numbers -----------------------------------------------------------------------------------------------------------------------
 
 // Evidence that a measured surface stands in known space.
@@ -284,7 +304,26 @@ typedef struct {
   SHARED_INT seen_shift;           // log2 of the bricks along a block's edge
 } Frame;
 
+// The camera of views that are evaluated. Images have a few columns and rows more than are counted: squares of pixels reach into them.
+typedef struct {
+  float fx, fy, cx, cy;
+  SHARED_INT width, height;
+  SHARED_INT row, image;   // pixels from one row to the next, and from one image to the next
+  float min_range, range;  // [m]
+  float slope_step;        // of the slope in a pixel
+} AskedCamera;
+
+// A view that is evaluated. Its local frame is the world's, moved to the lowest corner of block `origin`, in which the camera is.
+typedef struct {
+  Transform T_camera_local, T_local_camera;
+  float box_min[3], box_max[3];  // what counts lies in it, local frame [m]
+  SHARED_INT origin_x, origin_y, origin_z;
+  SHARED_INT first_block, end_block;  // in the list of blocks
+} AskedView;
+
 #ifndef __OPENCL_VERSION__
+static_assert(sizeof(AskedCamera) == 11 * 4, "AskedCamera must have no padding");
+static_assert(sizeof(AskedView) == (2 * 12 + 11) * 4, "AskedView must have no padding");
 static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
 static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");
 static_assert(sizeof(Window) == 7 * 4, "Window must have no padding");

@@ -1,12 +1,10 @@
 #include "frontier_surfels/mapper.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "frame/working_image.hpp"
 #include "frontier_surfels/map_file.hpp"
 #include "map/seen_fill.hpp"
-#include "map/view_blocks.hpp"
 #include "map/view_packing.hpp"
 #include "mapper/mapper_impl.hpp"
 
@@ -51,43 +49,6 @@ Changes Mapper::Impl::changes(std::uint64_t since) {
   map.reserve_ids(told.slowest());
   readers = told;  // nothing has failed: the reader gets the changes
   return changes;
-}
-
-StateChanges Mapper::state_changes(std::uint64_t since, double resolution) const {
-  return on_device([&] { return impl_->state_changes(since, resolution); });
-}
-
-StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution) {
-  const StateGrid checked_resolution(resolution);
-  begin_call();
-  remember_forgotten();
-  const bool is_part = looked_at.knows(since) && since <= sequence;
-  StateChanges changes = {sequence, is_part ? since : 0, resolution, {}};
-  std::vector<BlockKey> blocks = is_part ? looked_at.since(since) : known_blocks();
-  if (is_part) {
-    const std::vector<BlockKey> with_surfels = map.blocks_changed_since(static_cast<std::uint32_t>(since));
-    blocks.insert(blocks.end(), with_surfels.begin(), with_surfels.end());
-  }
-  changes.blocks = state_blocks.find(blocks, resolution, point_states, {views, seen, taking_back, map, config.seen_points});
-  if (!is_part)
-    changes.blocks.erase(std::remove_if(changes.blocks.begin(), changes.blocks.end(),
-                                        [](const StateBlock& block) { return block.cells == std::vector<std::uint8_t>{0}; }),
-                         changes.blocks.end());
-  return changes;
-}
-
-/// The blocks in memory of which anything is known.
-std::vector<BlockKey> Mapper::Impl::known_blocks() const {
-  std::vector<BlockKey> blocks = seen.blocks_with_points();
-  for (const BlockKey& block : map.blocks_changed_since(0)) blocks.push_back(block);
-  for (const std::uint64_t number : views.numbers()) {
-    const SavedView view = views.saved(number);
-    const std::vector<BlockKey> of_view = blocks_of_view(view.intrinsics, view.T_world_camera, config.z_max, map.block_size()).blocks;
-    blocks.insert(blocks.end(), of_view.begin(), of_view.end());
-  }
-  std::sort(blocks.begin(), blocks.end());
-  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-  return blocks;
 }
 
 std::vector<Surfel> Mapper::whole_map() const {

@@ -20,6 +20,7 @@
 #include "planner/boundaries.hpp"
 #include "planner/point_states.hpp"
 #include "planner/state_blocks.hpp"
+#include "planner/view_values.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
@@ -65,7 +66,8 @@ struct Mapper::Impl {
         remembering(commands),
         point_states(commands),
         boundaries(commands, lists),
-        state_blocks(commands) {
+        state_blocks(commands),
+        view_values(commands) {
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });
@@ -91,6 +93,7 @@ struct Mapper::Impl {
   StateChanges state_changes(std::uint64_t since, double resolution);
   std::vector<BlockKey> known_blocks() const;
   std::vector<FirstSurfel> first_within(const std::vector<MovingBox>& boxes, bool frontier_counts);
+  std::vector<ViewValue> evaluate_views(const ViewQuestion& question);
   SavedMap saved_map();
   void begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views);
   void load_views(const std::vector<SavedView>& saved);
@@ -123,6 +126,7 @@ struct Mapper::Impl {
   Boundaries boundaries;
   LookedAt looked_at;
   StateBlocks state_blocks;
+  ViewValues view_values;
 
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken

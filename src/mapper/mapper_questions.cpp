@@ -1,9 +1,17 @@
 // What planners ask: the states of points, rays, boxes and paths, and the boundary near points. Questions change nothing.
+#include <algorithm>
+
+#include "map/view_blocks.hpp"
 #include "mapper/mapper_impl.hpp"
 #include "planner/box_states.hpp"
 #include "planner/ray_states.hpp"
 
 namespace frontier_surfels {
+namespace {
+
+constexpr double kFarAway = 1e9;  // [m] nothing is mapped there: positions become floats
+
+}  // namespace
 
 std::vector<SpaceState> Mapper::states(const std::vector<Eigen::Vector3f>& points_world) const {
   return on_device([&] { return impl_->states(points_world); });
@@ -51,6 +59,58 @@ std::vector<RayState> Mapper::path_states(const std::vector<Ray>& paths_world, c
 std::vector<FirstSurfel> Mapper::Impl::first_within(const std::vector<MovingBox>& boxes, bool frontier_counts) {
   begin_call();
   return boundaries.first_within(boxes, frontier_counts, map);
+}
+
+StateChanges Mapper::state_changes(std::uint64_t since, double resolution) const {
+  return on_device([&] { return impl_->state_changes(since, resolution); });
+}
+
+StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution) {
+  const StateGrid checked_resolution(resolution);
+  begin_call();
+  remember_forgotten();
+  const bool is_part = looked_at.knows(since) && since <= sequence;
+  StateChanges changes = {sequence, is_part ? since : 0, resolution, {}};
+  std::vector<BlockKey> blocks = is_part ? looked_at.since(since) : known_blocks();
+  if (is_part) {
+    const std::vector<BlockKey> with_surfels = map.blocks_changed_since(static_cast<std::uint32_t>(since));
+    blocks.insert(blocks.end(), with_surfels.begin(), with_surfels.end());
+  }
+  changes.blocks = state_blocks.find(blocks, resolution, point_states, {views, seen, taking_back, map, config.seen_points});
+  if (!is_part)
+    changes.blocks.erase(std::remove_if(changes.blocks.begin(), changes.blocks.end(),
+                                        [](const StateBlock& block) { return block.cells == std::vector<std::uint8_t>{0}; }),
+                         changes.blocks.end());
+  return changes;
+}
+
+/// The blocks in memory of which anything is known.
+std::vector<BlockKey> Mapper::Impl::known_blocks() const {
+  std::vector<BlockKey> blocks = seen.blocks_with_points();
+  for (const BlockKey& block : map.blocks_changed_since(0)) blocks.push_back(block);
+  for (const std::uint64_t number : views.numbers()) {
+    const SavedView view = views.saved(number);
+    const std::vector<BlockKey> of_view = blocks_of_view(view.intrinsics, view.T_world_camera, config.z_max, map.block_size()).blocks;
+    blocks.insert(blocks.end(), of_view.begin(), of_view.end());
+  }
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
+}
+
+std::vector<ViewValue> Mapper::evaluate_views(const ViewQuestion& question) const {
+  check_question(question);
+  return on_device([&] { return impl_->evaluate_views(question); });
+}
+
+std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question) {
+  std::vector<Eigen::Vector3f> positions;
+  for (const Eigen::Isometry3d& T : question.T_world_camera)
+    positions.push_back(T.translation().cwiseMax(-kFarAway).cwiseMin(kFarAway).cast<float>());
+  const std::vector<SpaceState> found = states(positions);
+  std::vector<ViewValue> values = view_values.find(question, map);
+  for (std::size_t n = 0; n < values.size(); ++n) values[n].state = found[n];
+  return values;
 }
 
 }  // namespace frontier_surfels

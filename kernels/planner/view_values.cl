@@ -1,0 +1,211 @@
+// Values of views, for planners - ours: what a camera would see of the map.
+//
+// Surfels are drawn into an image of each view, nearest first as far as blocks go, and the nearest one stays. Each is the exact disc: the
+// ray through a pixel's centre hits it or not. A disc that no ray hits gets the pixel nearest to its centre. A pixel is a number that is
+// smaller where the surface is nearer, and that says all that counts, so that the smallest one is the answer in any order:
+//   bits 14 ... 31  depth where the ray hits the disc's plane: 18 bits of the float's, from VIEW_NEAR on, which are steps of 2^-14 of it
+//   bit 13          back: the normal points away from the camera
+//   bit 12          frontier
+//   bits 0 ... 11   slope: |n d| for the disc's normal n and the pixel's ray d, whose z is 1, in steps of slope_step
+//   images[views][image]: row by row; pixels behind a row's end are drawn as well, and never counted
+
+#define NEAR_BITS 0x3c000000u  // of VIEW_NEAR
+#define DEPTH_SHIFT 9          // bits of a float's that are left out
+#define SLOPE_BITS 12
+#define FRONTIER_PIXEL (1u << SLOPE_BITS)
+#define BACK_PIXEL (2u << SLOPE_BITS)
+#define DEPTH_STEP (4u << SLOPE_BITS)
+
+INLINE uintv depth_keys(floatv z) { return ((as_uintv(z) - NEAR_BITS) >> DEPTH_SHIFT) * DEPTH_STEP; }
+INLINE floatv depths_of_keys(uintv keys) { return as_floatv((keys / DEPTH_STEP << DEPTH_SHIFT) + (NEAR_BITS | 1u << (DEPTH_SHIFT - 1))); }
+
+// A disc that is drawn: in the camera's frame, and the pixels around it.
+typedef struct {
+  float x, y, z, n_x, n_y, n_z;
+  float from_plane;        // n c for its centre c
+  float radius2;           // [m2]
+  float z_low, z_high;     // it has no other depths
+  int middle_u, middle_v;  // pixel nearest to its centre
+  int low_u, low_v, high_u, high_v;
+  uint kind;  // FRONTIER_PIXEL, BACK_PIXEL
+} ViewDisc;
+
+// Pixels of an image that several work items draw need atomic operations.
+INLINE void put_square(uintv keys, uintv old, __global uint* to, int row, bool shared) {
+  if (!shared) {
+    store_square(min(keys, old), to, row);
+    return;
+  }
+  uint key[LANES];
+  vstorev(keys, 0, key);
+  for (uint left = lane_bits(MARK(keys < old)); left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    atomic_min(&to[m / SQUARE * row + m % SQUARE], key[m]);
+  }
+}
+
+INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global uint* image, bool shared) {
+  const float inverse_fx = 1.0f / camera->fx, inverse_fy = 1.0f / camera->fy, inverse_step = 1.0f / camera->slope_step;
+  const uintv nearest = depth_keys((floatv)(fmax(disc->z_low, VIEW_NEAR)));
+  for (int low_v = disc->low_v; low_v <= disc->high_v; low_v += SQUARE)
+    for (int low_u = disc->low_u; low_u <= disc->high_u; low_u += SQUARE) {
+      __global uint* square = image + low_v * camera->row + low_u;
+      const uintv old = load_square(square, camera->row);
+      if (!any_lane(MARK(old > nearest))) continue;
+      const intv u = low_u + square_columns(), v = low_v + square_rows();
+      const floatv d_x = (convert_floatv(u) - camera->cx) * inverse_fx, d_y = (convert_floatv(v) - camera->cy) * inverse_fy;
+      const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = disc->from_plane / slope;
+      const floatv x = hit * d_x - disc->x, y = hit * d_y - disc->y, z = hit - disc->z;
+      const intv middle = MARK((u == disc->middle_u) & (v == disc->middle_v));
+      // A ray in the disc's plane hits it nowhere, or anywhere: depths that are no numbers become those of the disc's near end.
+      const floatv depth = hit >= disc->z_low ? fmin(hit, disc->z_high) : (floatv)(disc->z_low);
+      const intv drawn = (middle | MARK(x * x + y * y + z * z <= disc->radius2)) & MARK((u <= disc->high_u) & (v <= disc->high_v)) &
+                         MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
+      if (!any_lane(drawn)) continue;
+      const uintv slopes = convert_uintv(fmin(fabs(slope) * inverse_step + 0.5f, (float)(FRONTIER_PIXEL - 1)));
+      const uintv keys = drawn ? depth_keys(depth) + disc->kind + slopes : (uintv)(VIEW_NOTHING);
+      put_square(keys, old, square, camera->row, shared);
+    }
+}
+
+// A range of pixels along an image's edge that holds all that is within `reach` of `middle`, and `nearest`.
+INLINE void pixel_range(floatv middle, floatv reach, intv nearest, int size, intv* low, intv* high) {
+  *low = max(min(ceil_int(clamp(middle - reach, -1e5f, 1e5f)), nearest), 0);
+  *high = min(max(floor_int(clamp(middle + reach, -1e5f, 1e5f)), nearest), size - 1);
+}
+
+// Draws LANES surfels, those whose bits are set.
+INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_local, Surfels s, uint lanes, __global uint* image,
+                         bool shared) {
+  const Points p = transformed(T_camera_local, s.position), n = rotated(T_camera_local, unpack_normals(s.normal));
+  const floatv reach_z = s.radius * sqrt(fmax(1.0f - n.z * n.z, 0.0f)), near_z = p.z - reach_z;
+  const intv whole = MARK(near_z >= VIEW_NEAR), has_middle = MARK(p.z >= VIEW_NEAR);
+  lanes &= lane_bits(MARK((p.z + reach_z >= VIEW_NEAR) & (near_z <= camera->range)));
+  if (lanes == 0) return;
+
+  // A point q of the disc is off the centre's column by f (q - p) (1, 0, -x / z) / z of q, and off its row alike.
+  const floatv depth = fmax(p.z, VIEW_NEAR), x = p.x / depth, y = p.y / depth, along_x = n.x - x * n.z, along_y = n.y - y * n.z;
+  const floatv scale = s.radius / fmax(near_z, VIEW_NEAR);
+  const floatv reach_u = camera->fx * scale * sqrt(fmax(1.0f + x * x - along_x * along_x, 0.0f)) + 0.01f;
+  const floatv reach_v = camera->fy * scale * sqrt(fmax(1.0f + y * y - along_y * along_y, 0.0f)) + 0.01f;
+  const floatv u = x * camera->fx + camera->cx, v = y * camera->fy + camera->cy;
+  const intv middle_u = floor_int(clamp(u, -1e5f, 1e5f) + 0.5f), middle_v = floor_int(clamp(v, -1e5f, 1e5f) + 0.5f);
+  intv low_u, low_v, high_u, high_v;
+  pixel_range(u, whole ? reach_u : (floatv)(1e5f), middle_u, camera->width, &low_u, &high_u);
+  pixel_range(v, whole ? reach_v : (floatv)(1e5f), middle_v, camera->height, &low_v, &high_v);
+  lanes &= lane_bits(MARK((low_u <= high_u) & (low_v <= high_v)));
+  if (lanes == 0) return;
+
+  const floatv from_plane = dot_products(n, p);
+  const uintv frontier = (s.attributes & SURFEL_OCCUPIED) != 0 ? (uintv)(0) : (uintv)(FRONTIER_PIXEL);
+  float to_x[LANES], to_y[LANES], to_z[LANES], n_x[LANES], n_y[LANES], n_z[LANES], plane[LANES], radius[LANES], reach[LANES];
+  int m_u[LANES], m_v[LANES], l_u[LANES], l_v[LANES], h_u[LANES], h_v[LANES];
+  uint kind[LANES];
+  vstorev(p.x, 0, to_x);
+  vstorev(p.y, 0, to_y);
+  vstorev(p.z, 0, to_z);
+  vstorev(n.x, 0, n_x);
+  vstorev(n.y, 0, n_y);
+  vstorev(n.z, 0, n_z);
+  vstorev(from_plane, 0, plane);
+  vstorev(s.radius, 0, radius);
+  vstorev(reach_z, 0, reach);
+  vstorev(has_middle ? middle_u : (intv)(-1), 0, m_u);
+  vstorev(middle_v, 0, m_v);
+  vstorev(low_u, 0, l_u);
+  vstorev(low_v, 0, l_v);
+  vstorev(high_u, 0, h_u);
+  vstorev(high_v, 0, h_v);
+  vstorev(from_plane < 0.0f ? frontier : frontier + BACK_PIXEL, 0, kind);
+  for (uint left = lanes; left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    const ViewDisc disc = {
+        to_x[m], to_y[m], to_z[m], n_x[m], n_y[m], n_z[m], plane[m], radius[m] * radius[m], to_z[m] - reach[m], to_z[m] + reach[m],
+        m_u[m],  m_v[m],  l_u[m],  l_v[m], h_u[m], h_v[m], kind[m]};
+    draw_disc(camera, &disc, image, shared);
+  }
+}
+
+// `per_view` work items share an image: each draws the surfels of some of the blocks that the view may see.
+//   in  views[count];  blocks: for each view, nearest first: number of the block * 4 + level;  pages, page_begin, merged, merged_count:
+//       see merged_surfels.cl
+//   i/o images: VIEW_NOTHING before
+__kernel void draw_views(const AskedCamera camera, const float block_size, __global const AskedView* views, const int count,
+                         const int per_view, __global const uint* blocks, __global const uint4* surfels, __global const ulong* alive,
+                         __global const int4* page_block, __global const uint* pages, __global const uint* page_begin,
+                         __global const uint4* merged, const uint stride, __global const uint* merged_count, __global uint* images) {
+  const int n = get_global_id(0) / per_view;
+  if (n >= count) return;
+  const AskedView view = views[n];
+  const Window window = {view.origin_x, view.origin_y, view.origin_z, 1, 1, 1, block_size};
+  __global uint* image = images + (ulong)n * camera.image;
+  const bool shared = per_view > 1;
+  for (int at = view.first_block + get_global_id(0) % per_view; at < view.end_block; at += per_view) {
+    const uint block = blocks[at] / 4, level = blocks[at] % 4, begin = page_begin[block], end = page_begin[block + 1];
+    const int4 corner = page_block[pages[begin]];
+    const uint chunks = level == 0 ? (end - begin) * PAGE_ITEMS : chunks_of(merged_count[2 * block + level - 1]);
+    __global const uint4* from = level == 0 ? surfels : merged + (level - 1) * (ulong)stride + PAGE_SLOTS * begin;
+    for (uint chunk = 0; chunk < chunks; ++chunk) {
+      uint first = LANES * chunk, lanes;
+      if (level == 0) {
+        const uint page = pages[begin + chunk / PAGE_ITEMS];
+        first = PAGE_SLOTS * page + first % PAGE_SLOTS;
+        lanes = lanes_of_page(alive[page], first);
+      } else {
+        lanes = lane_bits(MARK((int)first + lane_numbers() < (int)merged_count[2 * block + level - 1]));
+      }
+      if (lanes != 0) draw_surfels(&camera, &view.T_camera_local, load_surfels(&window, from, corner, first), lanes, image, shared);
+    }
+  }
+}
+
+INLINE ulong sum_of_lanes(ulongv values) {
+  ulong value[LANES], sum = 0;
+  vstorev(values, 0, value);
+  for (int m = 0; m < LANES; ++m) sum += value[m];
+  return sum;
+}
+INLINE uint sum_of_marks(intv sums) {
+  int value[LANES], sum = 0;
+  vstorev(sums, 0, value);
+  for (int m = 0; m < LANES; ++m) sum -= value[m];
+  return (uint)sum;
+}
+
+// One work item counts a row of an image.
+//   out areas[views][height][2]: frontier, occupied: of the surface that the pixels see, z^2 / slope, which is its area times fx fy, in
+//       steps of 1 / VIEW_AREA_ONE;  counts[views][height][VIEW_COUNTS]
+__kernel void count_views(const AskedCamera camera, __global const AskedView* views, const int count, __global const uint* images,
+                          __global ulong* areas, __global uint* counts) {
+  const int item = get_global_id(0), n = item / camera.height, v = item % camera.height;
+  if (n >= count) return;
+  const AskedView view = views[n];
+  __global const uint* pixels = images + (ulong)n * camera.image + v * camera.row;
+  ulongv frontier_area = 0, occupied_area = 0;
+  intv frontier_pixels = 0, occupied_pixels = 0, empty_pixels = 0;
+  for (int first = 0; first < camera.width; first += LANES) {
+    const intv u = first + lane_numbers(), exist = MARK(u < camera.width);
+    const uintv keys = vloadv(0, pixels + first);
+    const intv empty = MARK(keys == VIEW_NOTHING);
+    empty_pixels += empty & exist;
+    const floatv z = depths_of_keys(keys);
+    const Points p = {(convert_floatv(u) - camera.cx) / camera.fx * z, ((float)v - camera.cy) / camera.fy * z, z};
+    const Points at = transformed(&view.T_local_camera, p);
+    const intv inside = MARK((at.x >= view.box_min[0]) & (at.x <= view.box_max[0]) & (at.y >= view.box_min[1]) & (at.y <= view.box_max[1]) &
+                             (at.z >= view.box_min[2]) & (at.z <= view.box_max[2]));
+    const intv counted = exist & ~empty & inside & MARK(((keys & BACK_PIXEL) == 0) & (z >= camera.min_range));
+    const intv frontier = counted & MARK((keys & FRONTIER_PIXEL) != 0), occupied = counted & ~frontier;
+    if (!any_lane(counted)) continue;
+    const floatv slope = fmax(convert_floatv(keys & (FRONTIER_PIXEL - 1)) * camera.slope_step, VIEW_LEAST_SLOPE);
+    const floatv area = counted ? z * z / slope * VIEW_AREA_ONE : (floatv)(0.0f);
+    frontier_area += convert_ulongv(frontier ? area : (floatv)(0.0f));
+    occupied_area += convert_ulongv(occupied ? area : (floatv)(0.0f));
+    frontier_pixels += frontier;
+    occupied_pixels += occupied;
+  }
+  areas[2 * item] = sum_of_lanes(frontier_area);
+  areas[2 * item + 1] = sum_of_lanes(occupied_area);
+  counts[VIEW_COUNTS * item + VIEW_COUNT_FRONTIER] = sum_of_marks(frontier_pixels);
+  counts[VIEW_COUNTS * item + VIEW_COUNT_OCCUPIED] = sum_of_marks(occupied_pixels);
+  counts[VIEW_COUNTS * item + VIEW_COUNT_NOTHING] = sum_of_marks(empty_pixels);
+}

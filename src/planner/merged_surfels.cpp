@@ -1,0 +1,52 @@
+#include "planner/merged_surfels.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace frontier_surfels {
+namespace {
+
+constexpr std::size_t kMostWorkers = 64;
+constexpr std::size_t kMostScratchBytes = std::size_t{64} << 20;  // unless one worker needs more
+constexpr std::size_t kTableCells = MERGE_CELLS_FINE * MERGE_CELLS_FINE * MERGE_CELLS_FINE;
+
+}  // namespace
+
+MergedSurfels::MergedSurfels(Commands& commands)
+    : commands_(commands),
+      pages_(commands),
+      page_begin_(commands),
+      list_(commands),
+      sums_(commands),
+      table_(commands),
+      counts_(commands),
+      merged_(commands) {}
+
+void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
+                          const std::vector<cl_uint>& merged) {
+  std::vector<cl_uint> all, begin = {0};
+  for (const BlockIndex::Pages* own : pages) {
+    all.insert(all.end(), own->begin(), own->end());
+    begin.push_back(static_cast<cl_uint>(all.size()));
+  }
+  std::size_t most_pages = 1;
+  for (const cl_uint block : merged) most_pages = std::max(most_pages, pages[block]->size());
+  const std::size_t most_sums = PAGE_SLOTS * most_pages, bytes = most_sums * MERGE_SUM_WORDS * sizeof(cl_uint);
+  const std::size_t workers = std::clamp(kMostScratchBytes / bytes, std::size_t{1}, kMostWorkers);
+
+  stride_ = merged.empty() ? 0 : static_cast<cl_uint>(PAGE_SLOTS * all.size());
+  merged_.resize(kMergeLevels * stride_ + PAGE_SLOTS);  // whole vectors are read at their ends
+  counts_.resize(kMergeLevels * pages.size() + 1);
+  pages_.send(std::move(all));
+  page_begin_.send(std::move(begin));
+  if (merged.empty()) return;
+  sums_.resize(workers * most_sums * MERGE_SUM_WORDS);
+  table_.resize(workers * kTableCells);
+  table_.fill(stage, 0, workers * kTableCells);
+  list_.send(merged);
+  commands_.run(stage, "merge_surfels", workers, commands_.device().heavy_group(), static_cast<cl_float>(map.block_size()), map.surfels(),
+                map.alive(), pages_(), page_begin_(), list_(), static_cast<cl_uint>(merged.size()), static_cast<cl_uint>(workers), sums_(),
+                static_cast<cl_uint>(most_sums), table_(), merged_(), stride_, counts_());
+}
+
+}  // namespace frontier_surfels

@@ -1,0 +1,45 @@
+/// Surfels merged by cells, for views that see them from afar: kernels/planner/merged_surfels.cl.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "map/surfel_map.hpp"
+#include "opencl/commands.hpp"
+
+namespace frontier_surfels {
+
+/// Number of levels that surfels are merged to.
+constexpr int kMergeLevels = 2;
+
+/// Edge of the cells of a level from 1 on [m].
+inline double merge_cell_size(double block_size, int level) { return block_size / MERGE_CELLS_FINE * (1 << (level - 1)); }
+
+class MergedSurfels {
+ public:
+  explicit MergedSurfels(Commands& commands);
+
+  /// Merges the surfels of blocks of the map.
+  /// @param pages   of each block
+  /// @param merged  numbers of the blocks whose merged surfels are needed
+  void merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
+             const std::vector<cl_uint>& merged);
+
+  /// @name Results, for kernels.
+  /// @{
+  const cl::Buffer& pages() const { return pages_(); }
+  const cl::Buffer& page_begin() const { return page_begin_(); }
+  const cl::Buffer& surfels() const { return merged_(); }
+  cl_uint stride() const { return stride_; }
+  const cl::Buffer& counts() const { return counts_(); }
+  /// @}
+
+ private:
+  Commands& commands_;
+  SentArray<cl_uint> pages_, page_begin_, list_;
+  DeviceArray<cl_uint> sums_, table_, counts_;
+  DeviceArray<cl_uint4> merged_;
+  cl_uint stride_ = 0;
+};
+
+}  // namespace frontier_surfels
