@@ -7,8 +7,8 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr float kFarthest = 1e6F;       // [m] nothing is mapped beyond
-constexpr float kLargestRadius = 1e3F;  // [m]
+constexpr float kFarthest = 1e6F;     // [m] nothing is mapped beyond
+constexpr float kLargestRadius = 10;  // [m]
 
 /// A surfel stands for a face of the voxel that it was made in: half of that one's diagonal is its radius.
 double area_of(float radius) {
