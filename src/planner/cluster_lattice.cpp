@@ -1,0 +1,120 @@
+#include "planner/cluster_lattice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace frontier_surfels {
+namespace {
+
+constexpr float kFarthest = 1e6F;     // [m] nothing is mapped beyond
+constexpr float kLargestRadius = 10;  // [m]
+
+/// A surfel stands for a face of the voxel that it was made in: half of that one's diagonal is its radius.
+double area_of(float radius) {
+  const double edge = radius / kNewRadius;
+  return edge * edge;
+}
+
+std::int64_t in_units(double value, double unit) { return std::llround(value / unit); }
+
+}  // namespace
+
+void ClusterLattice::apply(const Changes& changes) {
+  check(changes);
+  if (changes.since == 0) {
+    pages_.clear();
+    cells_.clear();
+    changed_.clear();
+  }
+  for (const std::uint32_t id : changes.removed) put(id, {});
+  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
+}
+
+void ClusterLattice::check(const Changes& changes) const {
+  for (const Surfel& s : changes.updated) {
+    const bool near = s.position.allFinite() && s.position.cwiseAbs().maxCoeff() <= kFarthest;
+    if (!near || !s.normal.allFinite() || s.normal.cwiseAbs().maxCoeff() > 2 || !(s.radius > 0) || s.radius > kLargestRadius)
+      throw Error("Surfel " + std::to_string(s.id) +
+                  " cannot be clustered: its position, its normal or its radius is not finite, or far too large.");
+  }
+}
+
+/// Nullptr if no surfel near this id was ever seen.
+ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
+  const std::size_t page = id / kPage;
+  return page < pages_.size() && pages_[page] ? &(*pages_[page])[id % kPage] : nullptr;
+}
+
+void ClusterLattice::put(std::uint32_t id, const Kept& now) {
+  Kept* before = kept(id);
+  if (before == nullptr) {
+    if (now.radius == 0) return;
+    const std::size_t page = id / kPage;
+    if (page >= pages_.size()) pages_.resize(page + 1);
+    pages_[page] = std::make_unique<Page>();
+    before = kept(id);
+  }
+  const bool alike =
+      before->label == now.label && before->radius == now.radius && before->position == now.position && before->normal == now.normal;
+  if (alike) return;
+  // Of an occupied surfel only its cell counts.
+  const bool both_occupied = before->radius > 0 && now.radius > 0 && before->label == Label::kOccupied && now.label == Label::kOccupied;
+  if (!both_occupied || key_of(before->position) != key_of(now.position)) {
+    if (before->radius > 0) count(*before, -1);
+    if (now.radius > 0) count(now, 1);
+  }
+  *before = now;
+}
+
+void ClusterLattice::count(const Kept& surfel, int sign) {
+  const BlockKey key = key_of(surfel.position);
+  ClusterCell& cell = cells_[key];
+  cell.key = key;
+  if (!cell.changed) changed_.push_back(&cell);
+  cell.changed = true;
+  if (surfel.label == Label::kOccupied) {
+    cell.occupied += sign;
+    return;
+  }
+  cell.frontier += sign;
+  cell.area += sign * in_units(area_of(surfel.radius), kAreaUnit);
+  const int corner[] = {key.x, key.y, key.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
+    cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
+  }
+}
+
+std::vector<ClusterCell*> ClusterLattice::take_changed() {
+  std::vector<ClusterCell*> changed;
+  changed.swap(changed_);
+  std::sort(changed.begin(), changed.end(), [](const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; });
+  for (ClusterCell* cell : changed) cell->changed = false;
+  return changed;
+}
+
+void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
+  for (ClusterCell* cell : cells) {
+    cell->was_occupied = cell->occupied > 0;
+    if (cell->frontier == 0 && cell->occupied == 0) cells_.erase(BlockKey(cell->key));
+  }
+}
+
+ClusterCell* ClusterLattice::find(const BlockKey& key) {
+  const auto at = cells_.find(key);
+  return at == cells_.end() ? nullptr : &at->second;
+}
+
+BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
+  const Eigen::Array3i at = (position.cast<double>() / cell_).array().floor().cast<int>();
+  return {at.x(), at.y(), at.z()};
+}
+
+Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {
+  const Eigen::Vector3d corner = Eigen::Vector3d(cell.key.x, cell.key.y, cell.key.z) * cell_;
+  const Eigen::Vector3d sum(cell.position[0], cell.position[1], cell.position[2]);
+  return corner + sum * (kLengthUnit / std::max(1U, cell.frontier));
+}
+
+}  // namespace frontier_surfels

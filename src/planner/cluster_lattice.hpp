@@ -1,0 +1,82 @@
+/// Surfels gathered in cells, from which clusters are made.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "frontier_surfels/types.hpp"
+#include "map/block_key.hpp"
+
+namespace frontier_surfels {
+
+/// Sums are whole numbers of small units, so that they do not depend on the order in which surfels came and went.
+struct ClusterCell {
+  BlockKey key;                                      ///< the cell's lowest corner is this times its edge
+  std::int64_t area = 0;                             ///< of the boundary that frontier surfels stand for [kAreaUnit]
+  std::array<std::int64_t, 3> position = {0, 0, 0};  ///< sum of frontier surfels' distances from the cell's lowest corner [kLengthUnit]
+  std::array<std::int64_t, 3> normal = {0, 0, 0};    ///< sum of frontier surfels' normals [kNormalUnit]
+  std::uint32_t frontier = 0;                        ///< surfels
+  std::uint32_t occupied = 0;                        ///< surfels
+  std::uint32_t cluster = 0;                         ///< id; 0: none
+  std::uint32_t mark = 0;                            ///< of the search that is under way
+  bool changed = false;                              ///< since take_changed()
+  bool was_occupied = false;                         ///< at the last take_changed()
+};
+
+constexpr double kAreaUnit = 1.0 / (std::int64_t{1} << 36);    // [m2]
+constexpr double kLengthUnit = 1.0 / (std::int64_t{1} << 32);  // [m]
+constexpr double kNormalUnit = 1.0 / (std::int64_t{1} << 30);
+
+class ClusterLattice {
+ public:
+  explicit ClusterLattice(double cell) : cell_(cell) {}
+
+  /// @throws Error  a surfel cannot be used; nothing has changed
+  void apply(const Changes& changes);
+
+  /// Cells that differ from those at the last call, by key. Those without surfels are to be given to forget_empty().
+  std::vector<ClusterCell*> take_changed();
+  void forget_empty(const std::vector<ClusterCell*>& cells);
+
+  ClusterCell* find(const BlockKey& key);
+
+  /// Calls visit(cell) for the up to 26 cells with surfels that touch this one, by key.
+  template <typename Visit>
+  void for_neighbours(const ClusterCell& cell, Visit&& visit) {
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        for (int z = -1; z <= 1; ++z)
+          if (ClusterCell* other = x == 0 && y == 0 && z == 0 ? nullptr : find({cell.key.x + x, cell.key.y + y, cell.key.z + z}))
+            visit(*other);
+  }
+
+  double cell() const { return cell_; }
+  Eigen::Vector3d mean_position(const ClusterCell& cell) const;  ///< of its frontier surfels, world frame [m]
+
+ private:
+  /// What is kept of a surfel, to tell what changes.
+  struct Kept {
+    Eigen::Vector3f position = Eigen::Vector3f::Zero();
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    float radius = 0;  ///< 0: there is no surfel with this id
+    Label label = Label::kFrontier;
+  };
+  static constexpr std::size_t kPage = 4096;
+  using Page = std::array<Kept, kPage>;
+
+  void check(const Changes& changes) const;
+  Kept* kept(std::uint32_t id);
+  void put(std::uint32_t id, const Kept& now);
+  void count(const Kept& surfel, int sign);
+  BlockKey key_of(const Eigen::Vector3f& position) const;
+
+  double cell_;  ///< [m]
+  std::vector<std::unique_ptr<Page>> pages_;
+  std::unordered_map<BlockKey, ClusterCell> cells_;
+  std::vector<ClusterCell*> changed_;
+};
+
+}  // namespace frontier_surfels

@@ -1,0 +1,275 @@
+#include "planner/cluster_partition.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace frontier_surfels {
+namespace {
+
+bool by_key(const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; }
+
+CellBox box_of(const ClusterPartition::Cells& cells) {
+  CellBox box(cells.front()->key);
+  for (const ClusterCell* cell : cells) box.extend(CellBox(cell->key));
+  return box;
+}
+
+/// Two halves, on both sides of the plane through the mean of the cells across their longest axis.
+std::pair<ClusterPartition::Cells, ClusterPartition::Cells> halves(const ClusterPartition::Cells& cells) {
+  const auto centre = [](const ClusterCell* cell) { return Eigen::Vector3d(cell->key.x, cell->key.y, cell->key.z); };
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const ClusterCell* cell : cells) mean += centre(cell);
+  mean /= static_cast<double>(cells.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const ClusterCell* cell : cells) spread += (centre(cell) - mean) * (centre(cell) - mean).transpose();
+  const Eigen::Vector3d axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(2);
+
+  std::pair<ClusterPartition::Cells, ClusterPartition::Cells> sides;
+  for (ClusterCell* cell : cells) (axis.dot(centre(cell) - mean) > 0 ? sides.second : sides.first).push_back(cell);
+  return sides;
+}
+
+}  // namespace
+
+void CellBox::extend(const CellBox& other) {
+  low = {std::min(low.x, other.low.x), std::min(low.y, other.low.y), std::min(low.z, other.low.z)};
+  high = {std::max(high.x, other.high.x), std::max(high.y, other.high.y), std::max(high.z, other.high.z)};
+}
+
+int CellBox::longest_edge() const { return 1 + std::max({high.x - low.x, high.y - low.y, high.z - low.z}); }
+
+std::set<std::uint32_t> ClusterPartition::update(const Cells& changed) {
+  visited_ = 0;
+  touched_.clear();
+  shrunk_.clear();
+
+  const Cells fresh = sort_changes(changed);
+  for (const std::uint32_t id : std::set<std::uint32_t>(shrunk_)) count(id);
+
+  const Cells alone = join(fresh);
+  for (const std::uint32_t id : shrunk_) divide(id);
+  found(alone);
+
+  merge_small();
+  return touched_;
+}
+
+/// Takes cells that have no frontier any more out of their clusters. @return cells that have one, but no cluster yet
+ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
+  Cells fresh;
+  for (ClusterCell* cell : changed) {
+    ++visited_;
+    if ((cell->occupied > 0) != cell->was_occupied)
+      lattice_.for_neighbours(*cell, [this](const ClusterCell& other) {
+        if (other.cluster != 0) touched_.insert(other.cluster);
+      });
+    if (cell->cluster != 0) touched_.insert(cell->cluster);
+    if (cell->frontier > 0 && cell->cluster == 0) fresh.push_back(cell);
+    if (cell->frontier == 0 && cell->cluster != 0) {
+      shrunk_.insert(cell->cluster);
+      cell->cluster = 0;
+    }
+  }
+  for (const std::uint32_t id : shrunk_) {
+    Cells& cells = groups_.at(id).cells;
+    cells.erase(std::remove_if(cells.begin(), cells.end(), [](const ClusterCell* cell) { return cell->cluster == 0; }), cells.end());
+  }
+  return fresh;
+}
+
+/// Brings a group's sums up to date after it has lost cells. Without cells, it ends.
+void ClusterPartition::count(std::uint32_t id) {
+  const auto at = groups_.find(id);
+  if (at->second.cells.empty()) {
+    groups_.erase(at);
+    shrunk_.erase(id);
+  } else {
+    at->second = group_of(std::move(at->second.cells));
+  }
+}
+
+/// Gives new cells to clusters next to them, ring by ring. @return those that no cluster has room for
+ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
+  std::set<std::uint32_t> grown;
+  for (bool again = true; again;) {
+    Cells left;
+    std::vector<std::pair<ClusterCell*, std::uint32_t>> ring;
+    for (ClusterCell* cell : fresh) {
+      ++visited_;
+      const std::uint32_t id = neighbour_with_room(*cell);
+      if (id != 0) {
+        groups_.at(id).box.extend(CellBox(cell->key));
+        ring.emplace_back(cell, id);
+      } else {
+        left.push_back(cell);
+      }
+    }
+    // Cells of a ring do not see each other: else those with larger keys would be reached first.
+    for (const auto& [cell, id] : ring) {
+      cell->cluster = id;
+      groups_.at(id).cells.push_back(cell);
+      grown.insert(id);
+    }
+    again = !ring.empty();
+    fresh = std::move(left);
+  }
+  for (const std::uint32_t id : grown) {
+    Cells& cells = groups_.at(id).cells;
+    std::sort(cells.begin(), cells.end(), by_key);
+    touched_.insert(id);
+  }
+  return fresh;
+}
+
+/// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
+std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
+  std::map<std::uint32_t, int> contacts;
+  lattice_.for_neighbours(cell, [&](const ClusterCell& other) {
+    if (other.cluster != 0) ++contacts[other.cluster];
+  });
+  for (const std::uint32_t id : by_contact(contacts)) {
+    CellBox box = groups_.at(id).box;
+    box.extend(CellBox(cell.key));
+    if (box.longest_edge() <= max_extent_) return id;
+  }
+  return 0;
+}
+
+/// Makes several clusters of one that has fallen apart. The part of the largest area keeps the id.
+void ClusterPartition::divide(std::uint32_t id) {
+  std::vector<Cells> parts = components(groups_.at(id).cells);
+  if (parts.size() == 1) return;
+  const auto area_less = [](const Group& a, const Group& b) { return a.area < b.area; };
+  std::vector<Group> groups;
+  for (Cells& part : parts) groups.push_back(group_of(std::move(part)));
+  const auto largest = std::max_element(groups.begin(), groups.end(), area_less);
+  for (auto group = groups.begin(); group != groups.end(); ++group) {
+    const std::uint32_t own = group == largest ? id : next_id_++;
+    for (ClusterCell* cell : group->cells) cell->cluster = own;
+    touched_.insert(own);
+    groups_.insert_or_assign(own, std::move(*group));
+  }
+}
+
+/// New clusters of cells that are in none.
+void ClusterPartition::found(const Cells& cells) {
+  std::vector<Cells> parts;
+  for (const Cells& component : components(cells)) divide_to_extent(component, parts);
+  for (Cells& part : parts) {
+    const std::uint32_t id = next_id_++;
+    for (ClusterCell* cell : part) cell->cluster = id;
+    touched_.insert(id);
+    groups_.emplace(id, group_of(std::move(part)));
+  }
+}
+
+void ClusterPartition::divide_to_extent(const Cells& cells, std::vector<Cells>& parts) {
+  if (box_of(cells).longest_edge() <= max_extent_) {
+    parts.push_back(cells);
+    return;
+  }
+  const auto [lower, upper] = halves(cells);
+  for (const Cells* half : {&lower, &upper})
+    for (const Cells& component : components(*half)) divide_to_extent(component, parts);
+}
+
+/// Lets small clusters join their neighbours, where one of them has changed.
+void ClusterPartition::merge_small() {
+  for (const std::uint32_t id : std::set<std::uint32_t>(touched_)) {
+    const auto at = groups_.find(id);
+    if (at != groups_.end()) at->second = group_of(std::move(at->second.cells));
+  }
+  std::set<std::uint32_t> open = touched_;
+  while (!open.empty()) {
+    const std::uint32_t id = *open.begin();
+    open.erase(open.begin());
+    const auto at = groups_.find(id);
+    if (at == groups_.end()) continue;
+    const std::map<std::uint32_t, int> near = contacts(at->second);
+    if (at->second.area >= min_area_) {
+      // Its small neighbours may find room in it now.
+      for (const auto& [other, count] : near)
+        if (groups_.at(other).area < min_area_) open.insert(other);
+      continue;
+    }
+    for (const std::uint32_t other : by_contact(near)) {
+      CellBox box = at->second.box;
+      box.extend(groups_.at(other).box);
+      if (box.longest_edge() > max_extent_) continue;
+      open.insert(merge(id, other));
+      break;
+    }
+  }
+}
+
+/// @return the id that stays, that of the larger one
+std::uint32_t ClusterPartition::merge(std::uint32_t a, std::uint32_t b) {
+  const std::int64_t area_a = groups_.at(a).area, area_b = groups_.at(b).area;
+  const std::uint32_t stays = area_a > area_b || (area_a == area_b && a < b) ? a : b, goes = stays == a ? b : a;
+  Group& group = groups_.at(stays);
+  const Group other = std::move(groups_.at(goes));
+  groups_.erase(goes);
+  for (ClusterCell* cell : other.cells) cell->cluster = stays;
+
+  Cells all;
+  std::merge(group.cells.begin(), group.cells.end(), other.cells.begin(), other.cells.end(), std::back_inserter(all), by_key);
+  group.cells = std::move(all);
+  group.area += other.area;
+  group.box.extend(other.box);
+  touched_.insert(stays);
+  touched_.insert(goes);
+  return stays;
+}
+
+/// How many pairs of touching cells a group has with each of its neighbours.
+std::map<std::uint32_t, int> ClusterPartition::contacts(const Group& group) {
+  std::map<std::uint32_t, int> counts;
+  visited_ += group.cells.size();
+  for (const ClusterCell* cell : group.cells)
+    lattice_.for_neighbours(*cell, [&](const ClusterCell& other) {
+      if (other.cluster != 0 && other.cluster != cell->cluster) ++counts[other.cluster];
+    });
+  return counts;
+}
+
+/// Ids, those with most contact first.
+std::vector<std::uint32_t> ClusterPartition::by_contact(const std::map<std::uint32_t, int>& contacts) {
+  std::vector<std::uint32_t> ids;
+  for (const auto& [id, count] : contacts) ids.push_back(id);
+  std::stable_sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) { return contacts.at(a) > contacts.at(b); });
+  return ids;
+}
+
+/// The connected parts of cells that are given by key, in the order of their first cells. Each is ordered by key.
+std::vector<ClusterPartition::Cells> ClusterPartition::components(const Cells& cells) {
+  const std::uint32_t mark = ++mark_;
+  for (ClusterCell* cell : cells) cell->mark = mark;
+  visited_ += cells.size();
+  std::vector<Cells> parts;
+  for (ClusterCell* first : cells) {
+    if (first->mark != mark) continue;
+    Cells part = {first};
+    first->mark = 0;
+    for (std::size_t next = 0; next < part.size(); ++next)
+      lattice_.for_neighbours(*part[next], [&](ClusterCell& other) {
+        if (other.mark != mark) return;
+        other.mark = 0;
+        part.push_back(&other);
+      });
+    std::sort(part.begin(), part.end(), by_key);
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+ClusterPartition::Group ClusterPartition::group_of(Cells cells) {
+  const CellBox box = box_of(cells);
+  std::int64_t area = 0;
+  for (const ClusterCell* cell : cells) area += cell->area;
+  visited_ += cells.size();
+  return {std::move(cells), area, box};
+}
+
+}  // namespace frontier_surfels

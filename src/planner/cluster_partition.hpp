@@ -1,0 +1,72 @@
+/// Which cells form which cluster. Cells stay where they are, so that clusters keep their ids while the map changes.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "planner/cluster_lattice.hpp"
+
+namespace frontier_surfels {
+
+/// A box of cells, both ends included.
+struct CellBox {
+  BlockKey low, high;
+
+  explicit CellBox(const BlockKey& key) : low(key), high(key) {}
+  void extend(const CellBox& other);
+  int longest_edge() const;  ///< [cell]
+};
+
+class ClusterPartition {
+ public:
+  using Cells = std::vector<ClusterCell*>;
+
+  struct Group {
+    Cells cells;            ///< by key; never none
+    std::int64_t area = 0;  ///< [kAreaUnit]
+    CellBox box;
+  };
+
+  /// @param max_extent  longest edge of a cluster's box [cell]. @param min_area  below it, clusters join others [kAreaUnit]
+  ClusterPartition(ClusterLattice& lattice, int max_extent, std::int64_t min_area)
+      : lattice_(lattice), max_extent_(max_extent), min_area_(min_area) {}
+
+  /// Follows changes of cells, given by key. @return ids of clusters that are new, or have changed in any way; some may be gone
+  std::set<std::uint32_t> update(const Cells& changed);
+
+  /// To be called when the lattice forgets all cells. Ids are not given again.
+  void clear() { groups_.clear(); }
+
+  const std::map<std::uint32_t, Group>& groups() const { return groups_; }
+  std::size_t visited() const { return visited_; }  ///< cells that the last update looked at
+
+ private:
+  Cells sort_changes(const Cells& changed);
+  Cells join(Cells fresh);
+  std::uint32_t neighbour_with_room(const ClusterCell& cell);
+  void divide(std::uint32_t id);
+  void found(const Cells& cells);
+  void merge_small();
+  std::uint32_t merge(std::uint32_t a, std::uint32_t b);
+
+  void count(std::uint32_t id);
+  std::map<std::uint32_t, int> contacts(const Group& group);
+  static std::vector<std::uint32_t> by_contact(const std::map<std::uint32_t, int>& contacts);
+  std::vector<Cells> components(const Cells& cells);
+  void divide_to_extent(const Cells& cells, std::vector<Cells>& parts);
+  Group group_of(Cells cells);
+
+  ClusterLattice& lattice_;
+  int max_extent_;
+  std::int64_t min_area_;
+  std::map<std::uint32_t, Group> groups_;
+  std::uint32_t next_id_ = 1;
+  std::uint32_t mark_ = 0;
+  std::size_t visited_ = 0;
+  std::set<std::uint32_t> touched_;  ///< groups that have changed in this update
+  std::set<std::uint32_t> shrunk_;   ///< groups that have lost cells in this update
+};
+
+}  // namespace frontier_surfels
