@@ -18,8 +18,10 @@
 #include "ros/map_folder_watch.hpp"
 #include "ros/output/map_publisher.hpp"
 #include "ros/output/mapper_diagnostics.hpp"
+#include "ros/output/planner_publisher.hpp"
 #include "ros/output/surfel_messages.hpp"
 #include "ros/services/map_services.hpp"
+#include "ros/services/planner_services.hpp"
 #include "ros/services/service_thread.hpp"
 #include "ros/worker.hpp"
 
@@ -67,6 +69,8 @@ class MapperRos::Impl {
   void show_other_map();
   void reset_cameras();
   void publish_changes();
+  void publish_to_planners();
+  void push_to_planners();
   void after_work();
 
   ros::NodeHandle nh_, pnh_;
@@ -81,12 +85,14 @@ class MapperRos::Impl {
 
   ros::Publisher reports_;
   std::unique_ptr<MapPublisher> publisher_;
+  std::unique_ptr<PlannerPublisher> planner_publisher_;
   std::unique_ptr<Worker> worker_;
   std::vector<std::unique_ptr<CameraInput>> cameras_;
   std::unique_ptr<MapperDiagnostics> diagnostics_;
   std::unique_ptr<InputWatch> watch_;
   std::unique_ptr<ServiceThread> services_;
   std::unique_ptr<MapServices> map_services_;
+  std::unique_ptr<PlannerServices> planner_services_;
   ros::WallTimer folder_timer_;
   bool stopped_ = false;
 };
@@ -96,6 +102,7 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   reports_ = pnh_.advertise<FrameReport>("report", 100);
   worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { after_work(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
+  planner_publisher_ = std::make_unique<PlannerPublisher>(pnh_, config_, [this] { worker_->wake(); });
   const CameraInput::Listener listener = {[this] { worker_->wake(); }, [this](const DroppedImage& image) { report_dropped(image); }};
   for (const CameraTopics& topics : kCameras) cameras_.push_back(std::make_unique<CameraInput>(config_, topics, poses_, listener));
   diagnostics_ = std::make_unique<MapperDiagnostics>(nh_, pnh_, mapper_.device(), depth_topics(nh_));
@@ -111,6 +118,8 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   map_services_ = std::make_unique<MapServices>(
       *services_, config_, mapper_, *worker_,
       MapServices::Hooks{[this] { show_other_map(); }, [this] { reset_cameras(); }, [this](bool paused) { pause(paused); }});
+  planner_services_ =
+      std::make_unique<PlannerServices>(*services_, config_, mapper_, *worker_, *planner_publisher_, [this] { push_to_planners(); });
   services_->start();
   ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
 }
@@ -140,6 +149,7 @@ void MapperRos::Impl::stop() {
   cameras_.clear();
   services_->stop();
   publisher_.reset();
+  planner_publisher_.reset();
   try {
     mapper_.flush();
   } catch (const std::exception& fault) {
@@ -266,8 +276,25 @@ void MapperRos::Impl::publish_changes() {
   }
 }
 
+void MapperRos::Impl::publish_to_planners() {
+  if (!planner_publisher_->wants_changes()) return;
+  try {
+    push_to_planners();
+  } catch (const std::exception& fault) {
+    if (publishing_faults_.due(fault.what(), Clock::now()) > 0) ROS_ERROR("Planners cannot be told of the map: %s", fault.what());
+  }
+}
+
+void MapperRos::Impl::push_to_planners() {
+  std::optional<Changes> surfels;
+  if (planner_publisher_->wants_surfels()) surfels = mapper_.changes(planner_publisher_->surfel_sequence());
+  planner_publisher_->push(mapper_.state_changes(planner_publisher_->sequence(), config_.planner_resolution), std::move(surfels),
+                           state_.stamp);
+}
+
 void MapperRos::Impl::after_work() {
   publish_changes();
+  publish_to_planners();
   diagnostics_->set_map_folder_fault(folder_watch_.look(Clock::now()));
 }
 

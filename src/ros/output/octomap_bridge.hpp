@@ -1,0 +1,40 @@
+/// The grid of states as an octree of OctoMap, for planners that read nothing else.
+#pragma once
+
+#include <octomap/octomap.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "frontier_surfels/planner/state_grid.hpp"
+
+namespace frontier_surfels {
+
+/// Free and occupied cells become leaves with the sensor model's lowest and highest probability; unknown cells are not in the tree.
+class OctomapBridge {
+ public:
+  explicit OctomapBridge(double resolution);
+
+  /// Takes blocks over; since = 0: they are the whole grid.
+  void apply(const StateChanges& changes);
+
+  std::uint64_t sequence() const { return sequence_; }  ///< of what was applied last
+
+  /// Like OcTree::writeBinary(). Equal neighbours are one leaf.
+  void write(std::ostream& stream);
+
+  /// The content of an octomap_msgs/Octomap message: the tree without its header.
+  std::string binary_data();
+
+  /// Writes a .bt file: first to a temporary file, which is then renamed. @throws FileError
+  void save(const std::string& path);
+
+ private:
+  void set_block(const StateBlock& block);
+
+  std::unique_ptr<octomap::OcTree> tree_;
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace frontier_surfels
