@@ -26,6 +26,7 @@ void ClusterLattice::apply(const Changes& changes) {
     pages_.clear();
     cells_.clear();
     changed_.clear();
+    last_ = nullptr;
   }
   for (const std::uint32_t id : changes.removed) put(id, {});
   for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
@@ -69,8 +70,7 @@ void ClusterLattice::put(std::uint32_t id, const Kept& now) {
 
 void ClusterLattice::count(const Kept& surfel, int sign) {
   const BlockKey key = key_of(surfel.position);
-  ClusterCell& cell = cells_[key];
-  cell.key = key;
+  ClusterCell& cell = cell_at(key);
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (surfel.label == Label::kOccupied) {
@@ -86,6 +86,23 @@ void ClusterLattice::count(const Kept& surfel, int sign) {
   }
 }
 
+/// Surfels of a cell often follow each other, so that the last one is tried first.
+ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
+  if (last_ != nullptr && last_->key == key) return *last_;
+  const auto [at, is_new] = cells_.try_emplace(key);
+  last_ = &at->second;
+  if (!is_new) return *last_;
+  last_->key = key;
+  for (int n = 0; n < 26; ++n) {
+    const int place = n < 13 ? n : n + 1;  // of 27
+    const auto other = cells_.find({key.x + place / 9 - 1, key.y + place / 3 % 3 - 1, key.z + place % 3 - 1});
+    if (other == cells_.end()) continue;
+    last_->neighbours[n] = &other->second;
+    other->second.neighbours[25 - n] = last_;
+  }
+  return *last_;
+}
+
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
   std::vector<ClusterCell*> changed;
   changed.swap(changed_);
@@ -97,13 +114,12 @@ std::vector<ClusterCell*> ClusterLattice::take_changed() {
 void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
   for (ClusterCell* cell : cells) {
     cell->was_occupied = cell->occupied > 0;
-    if (cell->frontier == 0 && cell->occupied == 0) cells_.erase(BlockKey(cell->key));
+    if (cell->frontier > 0 || cell->occupied > 0) continue;
+    for (int n = 0; n < 26; ++n)
+      if (cell->neighbours[n] != nullptr) cell->neighbours[n]->neighbours[25 - n] = nullptr;
+    if (cell == last_) last_ = nullptr;
+    cells_.erase(BlockKey(cell->key));
   }
-}
-
-ClusterCell* ClusterLattice::find(const BlockKey& key) {
-  const auto at = cells_.find(key);
-  return at == cells_.end() ? nullptr : &at->second;
 }
 
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
