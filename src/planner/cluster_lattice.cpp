@@ -16,7 +16,18 @@ double area_of(float radius) {
   return edge * edge;
 }
 
-std::int64_t in_units(double value, double unit) { return std::llround(value / unit); }
+/// Rounded towards zero, which is quick; what is taken away again is the same.
+std::int64_t in_units(double value, double unit) { return static_cast<std::int64_t>(value * (1 / unit)); }
+
+int round_down(double value) {
+  const int whole = static_cast<int>(value);
+  return whole - (value < whole ? 1 : 0);
+}
+
+/// False for what is not finite.
+bool within(const Eigen::Vector3f& v, float limit) {
+  return std::abs(v.x()) <= limit && std::abs(v.y()) <= limit && std::abs(v.z()) <= limit;
+}
 
 }  // namespace
 
@@ -34,8 +45,7 @@ void ClusterLattice::apply(const Changes& changes) {
 
 void ClusterLattice::check(const Changes& changes) const {
   for (const Surfel& s : changes.updated) {
-    const bool near = s.position.allFinite() && s.position.cwiseAbs().maxCoeff() <= kFarthest;
-    if (!near || !s.normal.allFinite() || s.normal.cwiseAbs().maxCoeff() > 2 || !(s.radius > 0) || s.radius > kLargestRadius)
+    if (!within(s.position, kFarthest) || !within(s.normal, 2) || !(s.radius > 0) || s.radius > kLargestRadius)
       throw Error("Surfel " + std::to_string(s.id) +
                   " cannot be clustered: its position, its normal or its radius is not finite, or far too large.");
   }
@@ -123,8 +133,8 @@ void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
 }
 
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  const Eigen::Array3i at = (position.cast<double>() / cell_).array().floor().cast<int>();
-  return {at.x(), at.y(), at.z()};
+  const double per_metre = 1 / cell_;
+  return {round_down(position.x() * per_metre), round_down(position.y() * per_metre), round_down(position.z() * per_metre)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {
