@@ -16,7 +16,18 @@ double area_of(float radius) {
   return edge * edge;
 }
 
-std::int64_t in_units(double value, double unit) { return std::llround(value / unit); }
+/// Rounded towards zero, which is quick; what is taken away again is the same.
+std::int64_t in_units(double value, double unit) { return static_cast<std::int64_t>(value * (1 / unit)); }
+
+int round_down(double value) {
+  const int whole = static_cast<int>(value);
+  return whole - (value < whole ? 1 : 0);
+}
+
+/// False for what is not finite.
+bool within(const Eigen::Vector3f& v, float limit) {
+  return std::abs(v.x()) <= limit && std::abs(v.y()) <= limit && std::abs(v.z()) <= limit;
+}
 
 }  // namespace
 
@@ -26,6 +37,7 @@ void ClusterLattice::apply(const Changes& changes) {
     pages_.clear();
     cells_.clear();
     changed_.clear();
+    last_ = nullptr;
   }
   for (const std::uint32_t id : changes.removed) put(id, {});
   for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
@@ -33,8 +45,7 @@ void ClusterLattice::apply(const Changes& changes) {
 
 void ClusterLattice::check(const Changes& changes) const {
   for (const Surfel& s : changes.updated) {
-    const bool near = s.position.allFinite() && s.position.cwiseAbs().maxCoeff() <= kFarthest;
-    if (!near || !s.normal.allFinite() || s.normal.cwiseAbs().maxCoeff() > 2 || !(s.radius > 0) || s.radius > kLargestRadius)
+    if (!within(s.position, kFarthest) || !within(s.normal, 2) || !(s.radius > 0) || s.radius > kLargestRadius)
       throw Error("Surfel " + std::to_string(s.id) +
                   " cannot be clustered: its position, its normal or its radius is not finite, or far too large.");
   }
@@ -69,8 +80,7 @@ void ClusterLattice::put(std::uint32_t id, const Kept& now) {
 
 void ClusterLattice::count(const Kept& surfel, int sign) {
   const BlockKey key = key_of(surfel.position);
-  ClusterCell& cell = cells_[key];
-  cell.key = key;
+  ClusterCell& cell = cell_at(key);
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (surfel.label == Label::kOccupied) {
@@ -86,6 +96,23 @@ void ClusterLattice::count(const Kept& surfel, int sign) {
   }
 }
 
+/// Surfels of a cell often follow each other, so that the last one is tried first.
+ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
+  if (last_ != nullptr && last_->key == key) return *last_;
+  const auto [at, is_new] = cells_.try_emplace(key);
+  last_ = &at->second;
+  if (!is_new) return *last_;
+  last_->key = key;
+  for (int n = 0; n < 26; ++n) {
+    const int place = n < 13 ? n : n + 1;  // of 27
+    const auto other = cells_.find({key.x + place / 9 - 1, key.y + place / 3 % 3 - 1, key.z + place % 3 - 1});
+    if (other == cells_.end()) continue;
+    last_->neighbours[n] = &other->second;
+    other->second.neighbours[25 - n] = last_;
+  }
+  return *last_;
+}
+
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
   std::vector<ClusterCell*> changed;
   changed.swap(changed_);
@@ -97,18 +124,17 @@ std::vector<ClusterCell*> ClusterLattice::take_changed() {
 void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
   for (ClusterCell* cell : cells) {
     cell->was_occupied = cell->occupied > 0;
-    if (cell->frontier == 0 && cell->occupied == 0) cells_.erase(BlockKey(cell->key));
+    if (cell->frontier > 0 || cell->occupied > 0) continue;
+    for (int n = 0; n < 26; ++n)
+      if (cell->neighbours[n] != nullptr) cell->neighbours[n]->neighbours[25 - n] = nullptr;
+    if (cell == last_) last_ = nullptr;
+    cells_.erase(BlockKey(cell->key));
   }
 }
 
-ClusterCell* ClusterLattice::find(const BlockKey& key) {
-  const auto at = cells_.find(key);
-  return at == cells_.end() ? nullptr : &at->second;
-}
-
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  const Eigen::Array3i at = (position.cast<double>() / cell_).array().floor().cast<int>();
-  return {at.x(), at.y(), at.z()};
+  const double per_metre = 1 / cell_;
+  return {round_down(position.x() * per_metre), round_down(position.y() * per_metre), round_down(position.z() * per_metre)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

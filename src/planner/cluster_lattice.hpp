@@ -22,8 +22,10 @@ struct ClusterCell {
   std::uint32_t occupied = 0;                        ///< surfels
   std::uint32_t cluster = 0;                         ///< id; 0: none
   std::uint32_t mark = 0;                            ///< of the search that is under way
-  bool changed = false;                              ///< since take_changed()
-  bool was_occupied = false;                         ///< at the last take_changed()
+  /// Cells with surfels that touch this one; null where there is none. Opposite ones have places that add up to 25.
+  std::array<ClusterCell*, 26> neighbours = {};
+  bool changed = false;       ///< since take_changed()
+  bool was_occupied = false;  ///< at the last take_changed()
 };
 
 constexpr double kAreaUnit = 1.0 / (std::int64_t{1} << 36);    // [m2]
@@ -41,16 +43,11 @@ class ClusterLattice {
   std::vector<ClusterCell*> take_changed();
   void forget_empty(const std::vector<ClusterCell*>& cells);
 
-  ClusterCell* find(const BlockKey& key);
-
   /// Calls visit(cell) for the up to 26 cells with surfels that touch this one, by key.
   template <typename Visit>
-  void for_neighbours(const ClusterCell& cell, Visit&& visit) {
-    for (int x = -1; x <= 1; ++x)
-      for (int y = -1; y <= 1; ++y)
-        for (int z = -1; z <= 1; ++z)
-          if (ClusterCell* other = x == 0 && y == 0 && z == 0 ? nullptr : find({cell.key.x + x, cell.key.y + y, cell.key.z + z}))
-            visit(*other);
+  static void for_neighbours(const ClusterCell& cell, Visit&& visit) {
+    for (ClusterCell* other : cell.neighbours)
+      if (other != nullptr) visit(*other);
   }
 
   double cell() const { return cell_; }
@@ -71,12 +68,14 @@ class ClusterLattice {
   Kept* kept(std::uint32_t id);
   void put(std::uint32_t id, const Kept& now);
   void count(const Kept& surfel, int sign);
+  ClusterCell& cell_at(const BlockKey& key);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
   double cell_;  ///< [m]
   std::vector<std::unique_ptr<Page>> pages_;
   std::unordered_map<BlockKey, ClusterCell> cells_;
   std::vector<ClusterCell*> changed_;
+  ClusterCell* last_ = nullptr;  ///< of cell_at()
 };
 
 }  // namespace frontier_surfels

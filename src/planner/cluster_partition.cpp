@@ -62,7 +62,7 @@ ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
   for (ClusterCell* cell : changed) {
     ++visited_;
     if ((cell->occupied > 0) != cell->was_occupied)
-      lattice_.for_neighbours(*cell, [this](const ClusterCell& other) {
+      ClusterLattice::for_neighbours(*cell, [this](const ClusterCell& other) {
         if (other.cluster != 0) touched_.insert(other.cluster);
       });
     if (cell->cluster != 0) touched_.insert(cell->cluster);
@@ -126,7 +126,7 @@ ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
 /// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
 std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
   std::map<std::uint32_t, int> contacts;
-  lattice_.for_neighbours(cell, [&](const ClusterCell& other) {
+  ClusterLattice::for_neighbours(cell, [&](const ClusterCell& other) {
     if (other.cluster != 0) ++contacts[other.cluster];
   });
   for (const std::uint32_t id : by_contact(contacts)) {
@@ -175,26 +175,24 @@ void ClusterPartition::divide_to_extent(const Cells& cells, std::vector<Cells>& 
     for (const Cells& component : components(*half)) divide_to_extent(component, parts);
 }
 
-/// Lets small clusters join their neighbours, where one of them has changed.
+/// Lets small clusters join their neighbours.
 void ClusterPartition::merge_small() {
   for (const std::uint32_t id : std::set<std::uint32_t>(touched_)) {
     const auto at = groups_.find(id);
     if (at != groups_.end()) at->second = group_of(std::move(at->second.cells));
   }
-  std::set<std::uint32_t> open = touched_;
+  // Those next to a cluster that has changed may have room now. Small ones are few, so all of them try.
+  std::set<std::uint32_t> open;
+  if (!touched_.empty())
+    for (const auto& [id, group] : groups_)
+      if (group.area < min_area_) open.insert(id);
   while (!open.empty()) {
     const std::uint32_t id = *open.begin();
     open.erase(open.begin());
     const auto at = groups_.find(id);
     if (at == groups_.end()) continue;
-    const std::map<std::uint32_t, int> near = contacts(at->second);
-    if (at->second.area >= min_area_) {
-      // Its small neighbours may find room in it now.
-      for (const auto& [other, count] : near)
-        if (groups_.at(other).area < min_area_) open.insert(other);
-      continue;
-    }
-    for (const std::uint32_t other : by_contact(near)) {
+    if (at->second.area >= min_area_) continue;
+    for (const std::uint32_t other : by_contact(contacts(at->second))) {
       CellBox box = at->second.box;
       box.extend(groups_.at(other).box);
       if (box.longest_edge() > max_extent_) continue;
@@ -228,7 +226,7 @@ std::map<std::uint32_t, int> ClusterPartition::contacts(const Group& group) {
   std::map<std::uint32_t, int> counts;
   visited_ += group.cells.size();
   for (const ClusterCell* cell : group.cells)
-    lattice_.for_neighbours(*cell, [&](const ClusterCell& other) {
+    ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) {
       if (other.cluster != 0 && other.cluster != cell->cluster) ++counts[other.cluster];
     });
   return counts;
@@ -253,7 +251,7 @@ std::vector<ClusterPartition::Cells> ClusterPartition::components(const Cells& c
     Cells part = {first};
     first->mark = 0;
     for (std::size_t next = 0; next < part.size(); ++next)
-      lattice_.for_neighbours(*part[next], [&](ClusterCell& other) {
+      ClusterLattice::for_neighbours(*part[next], [&](ClusterCell& other) {
         if (other.mark != mark) return;
         other.mark = 0;
         part.push_back(&other);

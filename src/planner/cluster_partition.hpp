@@ -30,8 +30,7 @@ class ClusterPartition {
   };
 
   /// @param max_extent  longest edge of a cluster's box [cell]. @param min_area  below it, clusters join others [kAreaUnit]
-  ClusterPartition(ClusterLattice& lattice, int max_extent, std::int64_t min_area)
-      : lattice_(lattice), max_extent_(max_extent), min_area_(min_area) {}
+  ClusterPartition(int max_extent, std::int64_t min_area) : max_extent_(max_extent), min_area_(min_area) {}
 
   /// Follows changes of cells, given by key. @return ids of clusters that are new, or have changed in any way; some may be gone
   std::set<std::uint32_t> update(const Cells& changed);
@@ -58,7 +57,6 @@ class ClusterPartition {
   void divide_to_extent(const Cells& cells, std::vector<Cells>& parts);
   Group group_of(Cells cells);
 
-  ClusterLattice& lattice_;
   int max_extent_;
   std::int64_t min_area_;
   std::map<std::uint32_t, Group> groups_;

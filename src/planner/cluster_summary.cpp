@@ -54,10 +54,10 @@ const ClusterCell& middle(const Cells& cells, const ClusterLattice& lattice) {
   return *nearest;
 }
 
-bool near_occupied(const Cells& cells, ClusterLattice& lattice) {
+bool near_occupied(const Cells& cells) {
   for (const ClusterCell* cell : cells) {
     bool found = cell->occupied > 0;
-    lattice.for_neighbours(*cell, [&](const ClusterCell& other) { found = found || other.occupied > 0; });
+    ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) { found = found || other.occupied > 0; });
     if (found) return true;
   }
   return false;
@@ -65,7 +65,7 @@ bool near_occupied(const Cells& cells, ClusterLattice& lattice) {
 
 }  // namespace
 
-Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, ClusterLattice& lattice) {
+Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const ClusterLattice& lattice) {
   Cluster cluster;
   cluster.id = id;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
@@ -85,7 +85,7 @@ Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, ClusterL
     const ClusterCell& cell = middle(cells, lattice);
     cluster.points.push_back({lattice.mean_position(cell).cast<float>(), unit(normal_sum(cell), cluster.normal)});
   }
-  cluster.touches_occupied = near_occupied(group.cells, lattice);
+  cluster.touches_occupied = near_occupied(group.cells);
   return cluster;
 }
 

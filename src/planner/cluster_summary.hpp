@@ -7,6 +7,6 @@
 namespace frontier_surfels {
 
 /// Without viewpoints.
-Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, ClusterLattice& lattice);
+Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const ClusterLattice& lattice);
 
 }  // namespace frontier_surfels

@@ -51,7 +51,7 @@ struct FrontierClusters::Impl {
       : config(checked(c)),
         lattice(c.cell),
         // A little more than 20 cells of 5 cm must be 20 cells.
-        partition(lattice, static_cast<int>(std::floor(c.max_extent / c.cell + 1e-6)), std::llround(c.min_area / kAreaUnit)) {}
+        partition(static_cast<int>(std::floor(c.max_extent / c.cell + 1e-6)), std::llround(c.min_area / kAreaUnit)) {}
 
   /// A cluster as it was told, and as it was when its viewpoints were sought.
   struct Told {
