@@ -19,6 +19,12 @@
 INLINE uintv depth_keys(floatv z) { return ((as_uintv(z) - NEAR_BITS) >> DEPTH_SHIFT) * DEPTH_STEP; }
 INLINE floatv depths_of_keys(uintv keys) { return as_floatv((keys / DEPTH_STEP << DEPTH_SHIFT) + (NEAR_BITS | 1u << (DEPTH_SHIFT - 1))); }
 
+INLINE uintv slope_keys(const AskedCamera* camera, floatv slope) {
+  return convert_uintv(fmin(fabs(slope) * camera->inverse_step + 0.5f, (float)(FRONTIER_PIXEL - 1)));
+}
+// A ray in a disc's plane hits it nowhere, or anywhere: depths that are no numbers become those of the disc's near end.
+INLINE floatv depths_within(floatv hit, floatv low, floatv high) { return hit >= low ? fmin(hit, high) : low; }
+
 // A disc that is drawn: in the camera's frame, and the pixels around it.
 typedef struct {
   float x, y, z, n_x, n_y, n_z;
@@ -45,7 +51,6 @@ INLINE void put_square(uintv keys, uintv old, __global uint* to, int row, bool s
 }
 
 INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global uint* image, bool shared) {
-  const float inverse_fx = 1.0f / camera->fx, inverse_fy = 1.0f / camera->fy, inverse_step = 1.0f / camera->slope_step;
   const uintv nearest = depth_keys((floatv)(fmax(disc->z_low, VIEW_NEAR)));
   for (int low_v = disc->low_v; low_v <= disc->high_v; low_v += SQUARE)
     for (int low_u = disc->low_u; low_u <= disc->high_u; low_u += SQUARE) {
@@ -53,17 +58,15 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
       const uintv old = load_square(square, camera->row);
       if (!any_lane(MARK(old > nearest))) continue;
       const intv u = low_u + square_columns(), v = low_v + square_rows();
-      const floatv d_x = (convert_floatv(u) - camera->cx) * inverse_fx, d_y = (convert_floatv(v) - camera->cy) * inverse_fy;
+      const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
       const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = disc->from_plane / slope;
       const floatv x = hit * d_x - disc->x, y = hit * d_y - disc->y, z = hit - disc->z;
       const intv middle = MARK((u == disc->middle_u) & (v == disc->middle_v));
-      // A ray in the disc's plane hits it nowhere, or anywhere: depths that are no numbers become those of the disc's near end.
-      const floatv depth = hit >= disc->z_low ? fmin(hit, disc->z_high) : (floatv)(disc->z_low);
+      const floatv depth = depths_within(hit, (floatv)(disc->z_low), (floatv)(disc->z_high));
       const intv drawn = (middle | MARK(x * x + y * y + z * z <= disc->radius2)) & MARK((u <= disc->high_u) & (v <= disc->high_v)) &
                          MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
       if (!any_lane(drawn)) continue;
-      const uintv slopes = convert_uintv(fmin(fabs(slope) * inverse_step + 0.5f, (float)(FRONTIER_PIXEL - 1)));
-      const uintv keys = drawn ? depth_keys(depth) + disc->kind + slopes : (uintv)(VIEW_NOTHING);
+      const uintv keys = drawn ? depth_keys(depth) + disc->kind + slope_keys(camera, slope) : (uintv)(VIEW_NOTHING);
       put_square(keys, old, square, camera->row, shared);
     }
 }
@@ -72,6 +75,26 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
 INLINE void pixel_range(floatv middle, floatv reach, intv nearest, int size, intv* low, intv* high) {
   *low = max(min(ceil_int(clamp(middle - reach, -1e5f, 1e5f)), nearest), 0);
   *high = min(max(floor_int(clamp(middle + reach, -1e5f, 1e5f)), nearest), size - 1);
+}
+
+// Draws LANES discs of one pixel each, those whose bits are set.
+INLINE void draw_points(const AskedCamera* camera, Points p, Points n, floatv from_plane, floatv reach_z, uintv kinds, intv u, intv v,
+                        uint lanes, __global uint* image, bool shared) {
+  const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
+  const floatv slope = n.x * d_x + n.y * d_y + n.z, depth = depths_within(from_plane / slope, p.z - reach_z, p.z + reach_z);
+  uint key[LANES];
+  int at[LANES];
+  vstorev(depth_keys(depth) + kinds + slope_keys(camera, slope), 0, key);
+  vstorev(v * camera->row + u, 0, at);
+  for (uint left = lanes & lane_bits(MARK((depth >= VIEW_NEAR) & (depth <= camera->range))); left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    __global uint* pixel = image + at[m];
+    if (key[m] >= *pixel) continue;
+    if (shared)
+      atomic_min(pixel, key[m]);
+    else
+      *pixel = key[m];
+  }
 }
 
 // Draws LANES surfels, those whose bits are set.
@@ -98,6 +121,12 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
 
   const floatv from_plane = dot_products(n, p);
   const uintv frontier = (s.attributes & SURFEL_OCCUPIED) != 0 ? (uintv)(0) : (uintv)(FRONTIER_PIXEL);
+  const uintv kinds = from_plane < 0.0f ? frontier : frontier + BACK_PIXEL;
+  const uint points =
+      lanes & lane_bits(has_middle & MARK((low_u == high_u) & (low_v == high_v) & (low_u == middle_u) & (low_v == middle_v)));
+  if (points != 0) draw_points(camera, p, n, from_plane, reach_z, kinds, middle_u, middle_v, points, image, shared);
+  lanes &= ~points;
+  if (lanes == 0) return;
   float to_x[LANES], to_y[LANES], to_z[LANES], n_x[LANES], n_y[LANES], n_z[LANES], plane[LANES], radius[LANES], reach[LANES];
   int m_u[LANES], m_v[LANES], l_u[LANES], l_v[LANES], h_u[LANES], h_v[LANES];
   uint kind[LANES];
@@ -116,7 +145,7 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   vstorev(low_v, 0, l_v);
   vstorev(high_u, 0, h_u);
   vstorev(high_v, 0, h_v);
-  vstorev(from_plane < 0.0f ? frontier : frontier + BACK_PIXEL, 0, kind);
+  vstorev(kinds, 0, kind);
   for (uint left = lanes; left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     const ViewDisc disc = {
@@ -127,13 +156,13 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
 }
 
 // `per_view` work items share an image: each draws the surfels of some of the blocks that the view may see.
-//   in  views[count];  blocks: for each view, nearest first: number of the block * 4 + level;  pages, page_begin, merged, merged_count:
-//       see merged_surfels.cl
+//   in  views[count];  blocks: for each view, nearest first: number of the block * 2, + 1 if its merged surfels are drawn;
+//       pages, page_begin, merged, merged_count: see merged_surfels.cl
 //   i/o images: VIEW_NOTHING before
 __kernel void draw_views(const AskedCamera camera, const float block_size, __global const AskedView* views, const int count,
                          const int per_view, __global const uint* blocks, __global const uint4* surfels, __global const ulong* alive,
                          __global const int4* page_block, __global const uint* pages, __global const uint* page_begin,
-                         __global const uint4* merged, const uint stride, __global const uint* merged_count, __global uint* images) {
+                         __global const uint4* merged, __global const uint* merged_count, __global uint* images) {
   const int n = get_global_id(0) / per_view;
   if (n >= count) return;
   const AskedView view = views[n];
@@ -141,20 +170,23 @@ __kernel void draw_views(const AskedCamera camera, const float block_size, __glo
   __global uint* image = images + (ulong)n * camera.image;
   const bool shared = per_view > 1;
   for (int at = view.first_block + get_global_id(0) % per_view; at < view.end_block; at += per_view) {
-    const uint block = blocks[at] / 4, level = blocks[at] % 4, begin = page_begin[block], end = page_begin[block + 1];
+    const uint block = blocks[at] / 2, begin = page_begin[block], end = page_begin[block + 1];
     const int4 corner = page_block[pages[begin]];
-    const uint chunks = level == 0 ? (end - begin) * PAGE_ITEMS : chunks_of(merged_count[2 * block + level - 1]);
-    __global const uint4* from = level == 0 ? surfels : merged + (level - 1) * (ulong)stride + PAGE_SLOTS * begin;
-    for (uint chunk = 0; chunk < chunks; ++chunk) {
-      uint first = LANES * chunk, lanes;
-      if (level == 0) {
-        const uint page = pages[begin + chunk / PAGE_ITEMS];
-        first = PAGE_SLOTS * page + first % PAGE_SLOTS;
-        lanes = lanes_of_page(alive[page], first);
-      } else {
-        lanes = lane_bits(MARK((int)first + lane_numbers() < (int)merged_count[2 * block + level - 1]));
+    if (blocks[at] % 2 != 0) {
+      const uint left = merged_count[block];
+      for (uint m = 0; m < left; m += LANES) {
+        const Surfels s = load_surfels(&window, merged, corner, PAGE_SLOTS * begin + m);
+        draw_surfels(&camera, &view.T_camera_local, s, lane_bits(MARK((int)m + lane_numbers() < (int)left)), image, shared);
       }
-      if (lanes != 0) draw_surfels(&camera, &view.T_camera_local, load_surfels(&window, from, corner, first), lanes, image, shared);
+      continue;
+    }
+    for (uint m = begin; m < end; ++m) {
+      const ulong word = alive[pages[m]];
+      for (uint first = PAGE_SLOTS * pages[m]; first < PAGE_SLOTS * (pages[m] + 1); first += LANES) {
+        const uint lanes = lanes_of_page(word, first);
+        if (lanes == 0) continue;
+        draw_surfels(&camera, &view.T_camera_local, load_surfels(&window, surfels, corner, first), lanes, image, shared);
+      }
     }
   }
 }
