@@ -11,6 +11,7 @@
 
 #define NEAR_BITS 0x3c000000u  // of VIEW_NEAR
 #define DEPTH_SHIFT 9          // bits of a float's that are left out
+#define SMALL_DISC 2           // pixels along an edge
 #define SLOPE_BITS 12
 #define FRONTIER_PIXEL (1u << SLOPE_BITS)
 #define BACK_PIXEL (2u << SLOPE_BITS)
@@ -77,16 +78,28 @@ INLINE void pixel_range(floatv middle, floatv reach, intv nearest, int size, int
   *high = min(max(floor_int(clamp(middle + reach, -1e5f, 1e5f)), nearest), size - 1);
 }
 
-// Draws LANES discs of one pixel each, those whose bits are set.
-INLINE void draw_points(const AskedCamera* camera, Points p, Points n, floatv from_plane, floatv reach_z, uintv kinds, intv u, intv v,
-                        uint lanes, __global uint* image, bool shared) {
+// LANES discs.
+typedef struct {
+  Points p, n;  // centre and normal, the camera's frame
+  floatv from_plane, radius2, z_low, z_high;
+  intv middle_u, middle_v, low_u, low_v, high_u, high_v;
+  uintv kind;
+} ViewDiscs;
+
+// One pixel of each disc, column i and row j of those around it.
+INLINE void draw_pixel_of_each(const AskedCamera* camera, const ViewDiscs* d, int i, int j, intv marks, __global uint* image, bool shared) {
+  const intv u = d->low_u + i, v = d->low_v + j;
   const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
-  const floatv slope = n.x * d_x + n.y * d_y + n.z, depth = depths_within(from_plane / slope, p.z - reach_z, p.z + reach_z);
+  const floatv slope = d->n.x * d_x + d->n.y * d_y + d->n.z, hit = d->from_plane / slope;
+  const floatv x = hit * d_x - d->p.x, y = hit * d_y - d->p.y, z = hit - d->p.z;
+  const intv middle = MARK((u == d->middle_u) & (v == d->middle_v));
+  const floatv depth = depths_within(hit, d->z_low, d->z_high);
   uint key[LANES];
   int at[LANES];
-  vstorev(depth_keys(depth) + kinds + slope_keys(camera, slope), 0, key);
+  vstorev(depth_keys(depth) + d->kind + slope_keys(camera, slope), 0, key);
   vstorev(v * camera->row + u, 0, at);
-  for (uint left = lanes & lane_bits(MARK((depth >= VIEW_NEAR) & (depth <= camera->range))); left != 0; left &= left - 1) {
+  marks &= (middle | MARK(x * x + y * y + z * z <= d->radius2)) & MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
+  for (uint left = lane_bits(marks); left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     __global uint* pixel = image + at[m];
     if (key[m] >= *pixel) continue;
@@ -94,6 +107,20 @@ INLINE void draw_points(const AskedCamera* camera, Points p, Points n, floatv fr
       atomic_min(pixel, key[m]);
     else
       *pixel = key[m];
+  }
+}
+
+// Draws discs of at most SMALL_DISC pixels along an edge: all at once, one pixel after the other.
+INLINE void draw_small_discs(const AskedCamera* camera, const ViewDiscs* d, uint lanes, __global uint* image, bool shared) {
+  const intv small = lane_marks(lanes);
+  for (int j = 0; j < SMALL_DISC; ++j) {
+    const intv row = small & MARK(d->low_v + j <= d->high_v);
+    if (!any_lane(row)) return;
+    for (int i = 0; i < SMALL_DISC; ++i) {
+      const intv marks = row & MARK(d->low_u + i <= d->high_u);
+      if (!any_lane(marks)) break;
+      draw_pixel_of_each(camera, d, i, j, marks, image, shared);
+    }
   }
 }
 
@@ -122,10 +149,12 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   const floatv from_plane = dot_products(n, p);
   const uintv frontier = (s.attributes & SURFEL_OCCUPIED) != 0 ? (uintv)(0) : (uintv)(FRONTIER_PIXEL);
   const uintv kinds = from_plane < 0.0f ? frontier : frontier + BACK_PIXEL;
-  const uint points =
-      lanes & lane_bits(has_middle & MARK((low_u == high_u) & (low_v == high_v) & (low_u == middle_u) & (low_v == middle_v)));
-  if (points != 0) draw_points(camera, p, n, from_plane, reach_z, kinds, middle_u, middle_v, points, image, shared);
-  lanes &= ~points;
+  const ViewDiscs discs = {
+      p,      n,      from_plane, s.radius * s.radius, near_z, p.z + reach_z, has_middle ? middle_u : (intv)(-1), middle_v, low_u, low_v,
+      high_u, high_v, kinds};
+  const uint small = lanes & lane_bits(MARK((high_u - low_u < SMALL_DISC) & (high_v - low_v < SMALL_DISC)));
+  if (small != 0) draw_small_discs(camera, &discs, small, image, shared);
+  lanes &= ~small;
   if (lanes == 0) return;
   float to_x[LANES], to_y[LANES], to_z[LANES], n_x[LANES], n_y[LANES], n_z[LANES], plane[LANES], radius[LANES], reach[LANES];
   int m_u[LANES], m_v[LANES], l_u[LANES], l_v[LANES], h_u[LANES], h_v[LANES];
