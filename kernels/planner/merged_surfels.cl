@@ -1,11 +1,10 @@
 // Surfels merged by cells of their block, for views that see them from afar - ours.
 //
-// Level 0 is the map itself. For level 1 the surfels of a cell become one if they have the same label and their normals the same largest
-// coordinate, in absolute value, with the same sign: thin sheets keep both of their sides. Level 2 has cells twice as large. Larger surfels
-// than half a cell stay as they are. A merged surfel has the mean position and normal, and a radius with which a disc covers what its
-// surfels cover. All is summed in whole numbers, so that the order of the surfels does not matter.
-//   merged[level - 1][stride]: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n]
-//   merged_count[blocks][2]: how many there are of each level
+// The surfels of a cell become one if they have the same label and their normals the same largest coordinate, in absolute value, with the
+// same sign: thin sheets keep both of their sides. Larger surfels than half a cell stay as they are. A merged surfel has the mean position
+// and normal, and a radius with which a disc covers what its surfels cover. All is summed in whole numbers, so that the order of the
+// surfels does not matter.
+//   merged: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n];  merged_count[blocks]: how many there are
 
 // No more surfels of a cell are added up: larger sums would not fit.
 #define MERGE_MOST 32767
@@ -42,18 +41,18 @@ INLINE uint merge_most_radius(float block_size, int cells) {
   return halves[0];
 }
 
-// Adds sums, which may be those of one surfel. They may be read from where a new sum is written.
+// Adds a surfel, as sums of its own.
 INLINE void merge_into_cell(MergeCells* cells, MergeSum s) {
   uint first = 0, cell = 0;
   if (s.radius <= cells->most_radius) {
-    cell = merge_cell(cells, s.x / s.count, s.y / s.count, s.z / s.count);
+    cell = merge_cell(cells, s.x, s.y, s.z);
     first = cells->table[cell];
     for (uint n = first; n != 0; n = cells->sums[n - 1].next) {
       __global MergeSum* to = &cells->sums[n - 1];
       if (to->kind != s.kind) continue;
-      if (to->count + s.count > MERGE_MOST) return;
+      if (to->count == MERGE_MOST) return;
       to->squares += s.squares;
-      to->count += s.count;
+      ++to->count;
       to->x += s.x;
       to->y += s.y;
       to->z += s.z;
@@ -132,22 +131,22 @@ INLINE void write_merged(const MergeCells* cells, float block_size, __global uin
 
 // One work item merges the surfels of every `workers`-th of the listed blocks.
 //   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  list[count]: blocks
-//   sums[workers][most_sums] and table[workers][cells of level 1]: scratch; all of table is 0 before and afterwards
+//   sums[workers][most_sums] and table[workers][cells of a block]: scratch; all of table is 0 before and afterwards
 //   out merged, merged_count
 __kernel void merge_surfels(const float block_size, __global const uint4* surfels, __global const ulong* alive, __global const uint* pages,
                             __global const uint* page_begin, __global const uint* list, const uint count, const uint workers,
-                            __global uint* sums, const uint most_sums, __global uint* table, __global uint4* merged, const uint stride,
+                            __global uint* sums, const uint most_sums, __global uint* table, __global uint4* merged,
                             __global uint* merged_count) {
   const uint worker = get_global_id(0);
   if (worker >= workers) return;
   MergeCells cells;
   cells.sums = (__global MergeSum*)sums + (ulong)worker * most_sums;
-  cells.table = table + worker * (MERGE_CELLS_FINE * MERGE_CELLS_FINE * MERGE_CELLS_FINE);
+  cells.table = table + worker * (MERGE_CELLS * MERGE_CELLS * MERGE_CELLS);
   for (uint n = worker; n < count; n += workers) {
     const uint block = list[n], begin = page_begin[block], end = page_begin[block + 1];
     cells.count = 0;
-    cells.shift = 16 - (int)popcount(MERGE_CELLS_FINE - 1u);
-    cells.most_radius = merge_most_radius(block_size, MERGE_CELLS_FINE);
+    cells.shift = 16 - (int)popcount(MERGE_CELLS - 1u);
+    cells.most_radius = merge_most_radius(block_size, MERGE_CELLS);
     for (uint page = begin; page < end; ++page) {
       const ulong word = alive[pages[page]];
       const uint first = PAGE_SLOTS * pages[page];
@@ -157,16 +156,8 @@ __kernel void merge_surfels(const float block_size, __global const uint4* surfel
       }
     }
     write_merged(&cells, block_size, merged + PAGE_SLOTS * begin);
-    merged_count[2 * block] = cells.count;
+    merged_count[block] = cells.count;
 
-    clear_merge_table(&cells);
-    const uint fine = cells.count;
-    cells.count = 0;
-    ++cells.shift;
-    cells.most_radius = merge_most_radius(block_size, MERGE_CELLS_FINE / 2);
-    for (uint m = 0; m < fine; ++m) merge_into_cell(&cells, cells.sums[m]);
-    write_merged(&cells, block_size, merged + stride + PAGE_SLOTS * begin);
-    merged_count[2 * block + 1] = cells.count;
     clear_merge_table(&cells);
   }
 }

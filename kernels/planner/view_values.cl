@@ -11,6 +11,7 @@
 
 #define NEAR_BITS 0x3c000000u  // of VIEW_NEAR
 #define DEPTH_SHIFT 9          // bits of a float's that are left out
+#define SMALL_DISC 2           // pixels along an edge
 #define SLOPE_BITS 12
 #define FRONTIER_PIXEL (1u << SLOPE_BITS)
 #define BACK_PIXEL (2u << SLOPE_BITS)
@@ -18,6 +19,12 @@
 
 INLINE uintv depth_keys(floatv z) { return ((as_uintv(z) - NEAR_BITS) >> DEPTH_SHIFT) * DEPTH_STEP; }
 INLINE floatv depths_of_keys(uintv keys) { return as_floatv((keys / DEPTH_STEP << DEPTH_SHIFT) + (NEAR_BITS | 1u << (DEPTH_SHIFT - 1))); }
+
+INLINE uintv slope_keys(const AskedCamera* camera, floatv slope) {
+  return convert_uintv(fmin(fabs(slope) * camera->inverse_step + 0.5f, (float)(FRONTIER_PIXEL - 1)));
+}
+// A ray in a disc's plane hits it nowhere, or anywhere: depths that are no numbers become those of the disc's near end.
+INLINE floatv depths_within(floatv hit, floatv low, floatv high) { return hit >= low ? fmin(hit, high) : low; }
 
 // A disc that is drawn: in the camera's frame, and the pixels around it.
 typedef struct {
@@ -45,7 +52,6 @@ INLINE void put_square(uintv keys, uintv old, __global uint* to, int row, bool s
 }
 
 INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global uint* image, bool shared) {
-  const float inverse_fx = 1.0f / camera->fx, inverse_fy = 1.0f / camera->fy, inverse_step = 1.0f / camera->slope_step;
   const uintv nearest = depth_keys((floatv)(fmax(disc->z_low, VIEW_NEAR)));
   for (int low_v = disc->low_v; low_v <= disc->high_v; low_v += SQUARE)
     for (int low_u = disc->low_u; low_u <= disc->high_u; low_u += SQUARE) {
@@ -53,17 +59,15 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
       const uintv old = load_square(square, camera->row);
       if (!any_lane(MARK(old > nearest))) continue;
       const intv u = low_u + square_columns(), v = low_v + square_rows();
-      const floatv d_x = (convert_floatv(u) - camera->cx) * inverse_fx, d_y = (convert_floatv(v) - camera->cy) * inverse_fy;
+      const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
       const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = disc->from_plane / slope;
       const floatv x = hit * d_x - disc->x, y = hit * d_y - disc->y, z = hit - disc->z;
       const intv middle = MARK((u == disc->middle_u) & (v == disc->middle_v));
-      // A ray in the disc's plane hits it nowhere, or anywhere: depths that are no numbers become those of the disc's near end.
-      const floatv depth = hit >= disc->z_low ? fmin(hit, disc->z_high) : (floatv)(disc->z_low);
+      const floatv depth = depths_within(hit, (floatv)(disc->z_low), (floatv)(disc->z_high));
       const intv drawn = (middle | MARK(x * x + y * y + z * z <= disc->radius2)) & MARK((u <= disc->high_u) & (v <= disc->high_v)) &
                          MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
       if (!any_lane(drawn)) continue;
-      const uintv slopes = convert_uintv(fmin(fabs(slope) * inverse_step + 0.5f, (float)(FRONTIER_PIXEL - 1)));
-      const uintv keys = drawn ? depth_keys(depth) + disc->kind + slopes : (uintv)(VIEW_NOTHING);
+      const uintv keys = drawn ? depth_keys(depth) + disc->kind + slope_keys(camera, slope) : (uintv)(VIEW_NOTHING);
       put_square(keys, old, square, camera->row, shared);
     }
 }
@@ -72,6 +76,52 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
 INLINE void pixel_range(floatv middle, floatv reach, intv nearest, int size, intv* low, intv* high) {
   *low = max(min(ceil_int(clamp(middle - reach, -1e5f, 1e5f)), nearest), 0);
   *high = min(max(floor_int(clamp(middle + reach, -1e5f, 1e5f)), nearest), size - 1);
+}
+
+// LANES discs.
+typedef struct {
+  Points p, n;  // centre and normal, the camera's frame
+  floatv from_plane, radius2, z_low, z_high;
+  intv middle_u, middle_v, low_u, low_v, high_u, high_v;
+  uintv kind;
+} ViewDiscs;
+
+// One pixel of each disc, column i and row j of those around it.
+INLINE void draw_pixel_of_each(const AskedCamera* camera, const ViewDiscs* d, int i, int j, intv marks, __global uint* image, bool shared) {
+  const intv u = d->low_u + i, v = d->low_v + j;
+  const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
+  const floatv slope = d->n.x * d_x + d->n.y * d_y + d->n.z, hit = d->from_plane / slope;
+  const floatv x = hit * d_x - d->p.x, y = hit * d_y - d->p.y, z = hit - d->p.z;
+  const intv middle = MARK((u == d->middle_u) & (v == d->middle_v));
+  const floatv depth = depths_within(hit, d->z_low, d->z_high);
+  uint key[LANES];
+  int at[LANES];
+  vstorev(depth_keys(depth) + d->kind + slope_keys(camera, slope), 0, key);
+  vstorev(v * camera->row + u, 0, at);
+  marks &= (middle | MARK(x * x + y * y + z * z <= d->radius2)) & MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
+  for (uint left = lane_bits(marks); left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    __global uint* pixel = image + at[m];
+    if (key[m] >= *pixel) continue;
+    if (shared)
+      atomic_min(pixel, key[m]);
+    else
+      *pixel = key[m];
+  }
+}
+
+// Draws discs of at most SMALL_DISC pixels along an edge: all at once, one pixel after the other.
+INLINE void draw_small_discs(const AskedCamera* camera, const ViewDiscs* d, uint lanes, __global uint* image, bool shared) {
+  const intv small = lane_marks(lanes);
+  for (int j = 0; j < SMALL_DISC; ++j) {
+    const intv row = small & MARK(d->low_v + j <= d->high_v);
+    if (!any_lane(row)) return;
+    for (int i = 0; i < SMALL_DISC; ++i) {
+      const intv marks = row & MARK(d->low_u + i <= d->high_u);
+      if (!any_lane(marks)) break;
+      draw_pixel_of_each(camera, d, i, j, marks, image, shared);
+    }
+  }
 }
 
 // Draws LANES surfels, those whose bits are set.
@@ -98,6 +148,14 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
 
   const floatv from_plane = dot_products(n, p);
   const uintv frontier = (s.attributes & SURFEL_OCCUPIED) != 0 ? (uintv)(0) : (uintv)(FRONTIER_PIXEL);
+  const uintv kinds = from_plane < 0.0f ? frontier : frontier + BACK_PIXEL;
+  const ViewDiscs discs = {
+      p,      n,      from_plane, s.radius * s.radius, near_z, p.z + reach_z, has_middle ? middle_u : (intv)(-1), middle_v, low_u, low_v,
+      high_u, high_v, kinds};
+  const uint small = lanes & lane_bits(MARK((high_u - low_u < SMALL_DISC) & (high_v - low_v < SMALL_DISC)));
+  if (small != 0) draw_small_discs(camera, &discs, small, image, shared);
+  lanes &= ~small;
+  if (lanes == 0) return;
   float to_x[LANES], to_y[LANES], to_z[LANES], n_x[LANES], n_y[LANES], n_z[LANES], plane[LANES], radius[LANES], reach[LANES];
   int m_u[LANES], m_v[LANES], l_u[LANES], l_v[LANES], h_u[LANES], h_v[LANES];
   uint kind[LANES];
@@ -116,7 +174,7 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   vstorev(low_v, 0, l_v);
   vstorev(high_u, 0, h_u);
   vstorev(high_v, 0, h_v);
-  vstorev(from_plane < 0.0f ? frontier : frontier + BACK_PIXEL, 0, kind);
+  vstorev(kinds, 0, kind);
   for (uint left = lanes; left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     const ViewDisc disc = {
@@ -127,13 +185,13 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
 }
 
 // `per_view` work items share an image: each draws the surfels of some of the blocks that the view may see.
-//   in  views[count];  blocks: for each view, nearest first: number of the block * 4 + level;  pages, page_begin, merged, merged_count:
-//       see merged_surfels.cl
+//   in  views[count];  blocks: for each view, nearest first: number of the block * 2, + 1 if its merged surfels are drawn;
+//       pages, page_begin, merged, merged_count: see merged_surfels.cl
 //   i/o images: VIEW_NOTHING before
 __kernel void draw_views(const AskedCamera camera, const float block_size, __global const AskedView* views, const int count,
                          const int per_view, __global const uint* blocks, __global const uint4* surfels, __global const ulong* alive,
                          __global const int4* page_block, __global const uint* pages, __global const uint* page_begin,
-                         __global const uint4* merged, const uint stride, __global const uint* merged_count, __global uint* images) {
+                         __global const uint4* merged, __global const uint* merged_count, __global uint* images) {
   const int n = get_global_id(0) / per_view;
   if (n >= count) return;
   const AskedView view = views[n];
@@ -141,20 +199,23 @@ __kernel void draw_views(const AskedCamera camera, const float block_size, __glo
   __global uint* image = images + (ulong)n * camera.image;
   const bool shared = per_view > 1;
   for (int at = view.first_block + get_global_id(0) % per_view; at < view.end_block; at += per_view) {
-    const uint block = blocks[at] / 4, level = blocks[at] % 4, begin = page_begin[block], end = page_begin[block + 1];
+    const uint block = blocks[at] / 2, begin = page_begin[block], end = page_begin[block + 1];
     const int4 corner = page_block[pages[begin]];
-    const uint chunks = level == 0 ? (end - begin) * PAGE_ITEMS : chunks_of(merged_count[2 * block + level - 1]);
-    __global const uint4* from = level == 0 ? surfels : merged + (level - 1) * (ulong)stride + PAGE_SLOTS * begin;
-    for (uint chunk = 0; chunk < chunks; ++chunk) {
-      uint first = LANES * chunk, lanes;
-      if (level == 0) {
-        const uint page = pages[begin + chunk / PAGE_ITEMS];
-        first = PAGE_SLOTS * page + first % PAGE_SLOTS;
-        lanes = lanes_of_page(alive[page], first);
-      } else {
-        lanes = lane_bits(MARK((int)first + lane_numbers() < (int)merged_count[2 * block + level - 1]));
+    if (blocks[at] % 2 != 0) {
+      const uint left = merged_count[block];
+      for (uint m = 0; m < left; m += LANES) {
+        const Surfels s = load_surfels(&window, merged, corner, PAGE_SLOTS * begin + m);
+        draw_surfels(&camera, &view.T_camera_local, s, lane_bits(MARK((int)m + lane_numbers() < (int)left)), image, shared);
       }
-      if (lanes != 0) draw_surfels(&camera, &view.T_camera_local, load_surfels(&window, from, corner, first), lanes, image, shared);
+      continue;
+    }
+    for (uint m = begin; m < end; ++m) {
+      const ulong word = alive[pages[m]];
+      for (uint first = PAGE_SLOTS * pages[m]; first < PAGE_SLOTS * (pages[m] + 1); first += LANES) {
+        const uint lanes = lanes_of_page(word, first);
+        if (lanes == 0) continue;
+        draw_surfels(&camera, &view.T_camera_local, load_surfels(&window, surfels, corner, first), lanes, image, shared);
+      }
     }
   }
 }

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kMostWorkers = 64;
 constexpr std::size_t kMostScratchBytes = std::size_t{64} << 20;  // unless one worker needs more
-constexpr std::size_t kTableCells = MERGE_CELLS_FINE * MERGE_CELLS_FINE * MERGE_CELLS_FINE;
+constexpr std::size_t kTableCells = MERGE_CELLS * MERGE_CELLS * MERGE_CELLS;
 
 }  // namespace
 
@@ -34,9 +34,8 @@ void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::ve
   const std::size_t most_sums = PAGE_SLOTS * most_pages, bytes = most_sums * MERGE_SUM_WORDS * sizeof(cl_uint);
   const std::size_t workers = std::clamp(kMostScratchBytes / bytes, std::size_t{1}, kMostWorkers);
 
-  stride_ = merged.empty() ? 0 : static_cast<cl_uint>(PAGE_SLOTS * all.size());
-  merged_.resize(kMergeLevels * stride_ + PAGE_SLOTS);  // whole vectors are read at their ends
-  counts_.resize(kMergeLevels * pages.size() + 1);
+  merged_.resize(PAGE_SLOTS * (merged.empty() ? 1 : all.size() + 1));  // whole vectors are read at their ends
+  counts_.resize(pages.size() + 1);
   pages_.send(std::move(all));
   page_begin_.send(std::move(begin));
   if (merged.empty()) return;
@@ -46,7 +45,7 @@ void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::ve
   list_.send(merged);
   commands_.run(stage, "merge_surfels", workers, commands_.device().heavy_group(), static_cast<cl_float>(map.block_size()), map.surfels(),
                 map.alive(), pages_(), page_begin_(), list_(), static_cast<cl_uint>(merged.size()), static_cast<cl_uint>(workers), sums_(),
-                static_cast<cl_uint>(most_sums), table_(), merged_(), stride_, counts_());
+                static_cast<cl_uint>(most_sums), table_(), merged_(), counts_());
 }
 
 }  // namespace frontier_surfels

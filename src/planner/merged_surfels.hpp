@@ -9,12 +9,6 @@
 
 namespace frontier_surfels {
 
-/// Number of levels that surfels are merged to.
-constexpr int kMergeLevels = 2;
-
-/// Edge of the cells of a level from 1 on [m].
-inline double merge_cell_size(double block_size, int level) { return block_size / MERGE_CELLS_FINE * (1 << (level - 1)); }
-
 class MergedSurfels {
  public:
   explicit MergedSurfels(Commands& commands);
@@ -30,7 +24,6 @@ class MergedSurfels {
   const cl::Buffer& pages() const { return pages_(); }
   const cl::Buffer& page_begin() const { return page_begin_(); }
   const cl::Buffer& surfels() const { return merged_(); }
-  cl_uint stride() const { return stride_; }
   const cl::Buffer& counts() const { return counts_(); }
   /// @}
 
@@ -39,7 +32,6 @@ class MergedSurfels {
   SentArray<cl_uint> pages_, page_begin_, list_;
   DeviceArray<cl_uint> sums_, table_, counts_;
   DeviceArray<cl_uint4> merged_;
-  cl_uint stride_ = 0;
 };
 
 }  // namespace frontier_surfels

@@ -19,7 +19,6 @@ constexpr std::size_t kMostImageBytes = std::size_t{64} << 20;  // of the views 
 constexpr double kFarthest = 1e6;                               // [m] nothing is mapped beyond
 constexpr int kSpare = 16;                                      // columns behind an image's end that vectors reach into
 constexpr double kCellPixels = 2;                               // surfels are merged where a cell is at most this large in the image
-constexpr int kLevels = 4;                                      // in a block's number for draw_views
 
 void require(bool fine, const std::string& sentence) {
   if (!fine) throw Error("The question about views cannot be answered: " + sentence);
@@ -62,6 +61,9 @@ AskedCamera asked_camera(const ViewQuestion& question) {
   camera.min_range = static_cast<float>(question.min_range);
   camera.range = static_cast<float>(question.range);
   camera.slope_step = static_cast<float>(Pyramid(c).longest_ray() / 4095);
+  camera.inverse_fx = 1 / camera.fx;
+  camera.inverse_fy = 1 / camera.fy;
+  camera.inverse_step = 1 / camera.slope_step;
   return camera;
 }
 
@@ -112,7 +114,7 @@ void check_question(const ViewQuestion& question) {
             "box_world has a minimum that is larger than its maximum, or not a number.");
 }
 
-/// Which blocks the views may see, in which order and at which level.
+/// Which blocks the views may see, in which order and which are so far that their surfels are merged.
 struct ViewValues::Plan {
   std::vector<AskedView> views;
   std::vector<cl_uint> blocks;                  ///< see draw_views
@@ -156,24 +158,19 @@ struct ViewValues::Plan {
         block.number = static_cast<int>(pages.size());
         pages.push_back(block.pages);
       }
-      const int level = level_at(depth);
-      if (level > 0 && !block.merged) {
+      const bool far = small_cells(depth);
+      if (far && !block.merged) {
         block.merged = true;
         merged.push_back(static_cast<cl_uint>(block.number));
       }
-      blocks.push_back(static_cast<cl_uint>(kLevels * block.number + level));
+      blocks.push_back(static_cast<cl_uint>(2 * block.number + (far ? 1 : 0)));
     }
     view.end_block = static_cast<cl_int>(blocks.size());
     views.push_back(view);
   }
 
-  /// The level whose cells are at most kCellPixels large wherever in the block they are.
-  int level_at(double depth) const {
-    const double nearest = depth - std::sqrt(0.75) * size_;
-    int level = 0;
-    while (level < kMergeLevels && merge_cell_size(size_, level + 1) * focal_ <= kCellPixels * nearest) ++level;
-    return level;
-  }
+  /// Are cells at most kCellPixels large wherever in the block they are?
+  bool small_cells(double depth) const { return size_ / MERGE_CELLS * focal_ <= kCellPixels * (depth - std::sqrt(0.75) * size_); }
 
   const ViewQuestion& question_;
   const Pyramid pyramid_;
@@ -214,8 +211,7 @@ void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std:
     const std::size_t per_view = items_per_view(count);
     commands_.run(kStage, "draw_views", count * per_view, commands_.device().heavy_group(), camera, static_cast<cl_float>(map.block_size()),
                   views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view), blocks_(), map.surfels(), map.alive(),
-                  map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(), merged_.stride(), merged_.counts(),
-                  images_());
+                  map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(), merged_.counts(), images_());
   }
   areas_.resize(2 * rows);
   counts_.resize(VIEW_COUNTS * rows);
