@@ -35,9 +35,9 @@ void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
     pages_.clear();
-    cells_.clear();
+    cubes_.clear();
+    last_cube_ = {{}, nullptr};
     changed_.clear();
-    last_ = nullptr;
   }
   for (const std::uint32_t id : changes.removed) put(id, {});
   for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
@@ -96,21 +96,40 @@ void ClusterLattice::count(const Kept& surfel, int sign) {
   }
 }
 
-/// Surfels of a cell often follow each other, so that the last one is tried first.
+/// Nullptr if there is none. The last one is tried first.
+ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
+  if (last_cube_.second != nullptr && last_cube_.first == cube) return last_cube_.second;
+  const auto at = cubes_.find(cube);
+  if (at == cubes_.end()) return nullptr;
+  last_cube_ = {cube, &at->second};
+  return &at->second;
+}
+
+ClusterCell* ClusterLattice::find(const BlockKey& key) {
+  Cube* cube = find_cube(cube_of(key));
+  return cube == nullptr ? nullptr : cube->cells[place_of(key)].get();
+}
+
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
-  if (last_ != nullptr && last_->key == key) return *last_;
-  const auto [at, is_new] = cells_.try_emplace(key);
-  last_ = &at->second;
-  if (!is_new) return *last_;
-  last_->key = key;
+  Cube* cube = find_cube(cube_of(key));
+  if (cube == nullptr) cube = &cubes_[cube_of(key)];
+  std::unique_ptr<ClusterCell>& cell = cube->cells[place_of(key)];
+  if (!cell) {
+    cell = std::make_unique<ClusterCell>();
+    cell->key = key;
+    ++cube->count;
+    link(*cell);
+  }
+  return *cell;
+}
+
+void ClusterLattice::link(ClusterCell& cell) {
   for (int n = 0; n < 26; ++n) {
     const int place = n < 13 ? n : n + 1;  // of 27
-    const auto other = cells_.find({key.x + place / 9 - 1, key.y + place / 3 % 3 - 1, key.z + place % 3 - 1});
-    if (other == cells_.end()) continue;
-    last_->neighbours[n] = &other->second;
-    other->second.neighbours[25 - n] = last_;
+    ClusterCell* other = find({cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1});
+    cell.neighbours[n] = other;
+    if (other != nullptr) other->neighbours[25 - n] = &cell;
   }
-  return *last_;
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
@@ -127,14 +146,17 @@ void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
     if (cell->frontier > 0 || cell->occupied > 0) continue;
     for (int n = 0; n < 26; ++n)
       if (cell->neighbours[n] != nullptr) cell->neighbours[n]->neighbours[25 - n] = nullptr;
-    if (cell == last_) last_ = nullptr;
-    cells_.erase(BlockKey(cell->key));
+    const BlockKey key = cell->key;
+    Cube* cube = find_cube(cube_of(key));
+    cube->cells[place_of(key)].reset();
+    if (--cube->count > 0) continue;
+    last_cube_ = {{}, nullptr};
+    cubes_.erase(cube_of(key));
   }
 }
 
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  const double per_metre = 1 / cell_;
-  return {round_down(position.x() * per_metre), round_down(position.y() * per_metre), round_down(position.z() * per_metre)};
+  return {round_down(position.x() / cell_), round_down(position.y() / cell_), round_down(position.z() / cell_)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
@@ -64,18 +65,29 @@ class ClusterLattice {
   static constexpr std::size_t kPage = 4096;
   using Page = std::array<Kept, kPage>;
 
+  /// 8^3 cells; most questions after neighbours end in the same cube.
+  struct Cube {
+    std::array<std::unique_ptr<ClusterCell>, 512> cells;
+    int count = 0;
+  };
+  static BlockKey cube_of(const BlockKey& key) { return {key.x >> 3, key.y >> 3, key.z >> 3}; }
+  static std::size_t place_of(const BlockKey& key) { return (key.x & 7) << 6 | (key.y & 7) << 3 | (key.z & 7); }
+  Cube* find_cube(const BlockKey& cube);
+
   void check(const Changes& changes) const;
   Kept* kept(std::uint32_t id);
   void put(std::uint32_t id, const Kept& now);
   void count(const Kept& surfel, int sign);
   ClusterCell& cell_at(const BlockKey& key);
+  ClusterCell* find(const BlockKey& key);
+  void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
   double cell_;  ///< [m]
   std::vector<std::unique_ptr<Page>> pages_;
-  std::unordered_map<BlockKey, ClusterCell> cells_;
+  std::unordered_map<BlockKey, Cube> cubes_;
+  std::pair<BlockKey, Cube*> last_cube_ = {{}, nullptr};  ///< of find()
   std::vector<ClusterCell*> changed_;
-  ClusterCell* last_ = nullptr;  ///< of cell_at()
 };
 
 }  // namespace frontier_surfels
