@@ -40,7 +40,7 @@ void ClusterLattice::apply(const Changes& changes) {
     changed_.clear();
   }
   for (const std::uint32_t id : changes.removed) put(id, {});
-  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
+  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label, nullptr});
 }
 
 void ClusterLattice::check(const Changes& changes) const {
@@ -57,7 +57,7 @@ ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
   return page < pages_.size() && pages_[page] ? &(*pages_[page])[id % kPage] : nullptr;
 }
 
-void ClusterLattice::put(std::uint32_t id, const Kept& now) {
+void ClusterLattice::put(std::uint32_t id, Kept now) {
   Kept* before = kept(id);
   if (before == nullptr) {
     if (now.radius == 0) return;
@@ -69,25 +69,27 @@ void ClusterLattice::put(std::uint32_t id, const Kept& now) {
   const bool alike =
       before->label == now.label && before->radius == now.radius && before->position == now.position && before->normal == now.normal;
   if (alike) return;
+  const BlockKey key = key_of(now.position);
+  const bool same_cell = before->radius > 0 && before->cell->key == key;
+  if (now.radius > 0) now.cell = same_cell ? before->cell : &cell_at(key);
   // Of an occupied surfel only its cell counts.
-  const bool both_occupied = before->radius > 0 && now.radius > 0 && before->label == Label::kOccupied && now.label == Label::kOccupied;
-  if (!both_occupied || key_of(before->position) != key_of(now.position)) {
+  if (!same_cell || now.radius == 0 || before->label == Label::kFrontier || now.label == Label::kFrontier) {
     if (before->radius > 0) count(*before, -1);
     if (now.radius > 0) count(now, 1);
   }
   *before = now;
 }
 
-void ClusterLattice::count(const Kept& surfel, int sign) {
-  const BlockKey key = key_of(surfel.position);
-  ClusterCell& cell = cell_at(key);
+void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
+  ClusterCell& cell = *surfel.cell;
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (surfel.label == Label::kOccupied) {
-    cell.occupied += sign;
+    cell.occupied += static_cast<std::uint32_t>(sign);
     return;
   }
-  cell.frontier += sign;
+  const BlockKey& key = cell.key;
+  cell.frontier += static_cast<std::uint32_t>(sign);
   cell.area += sign * in_units(area_of(surfel.radius), kAreaUnit);
   const int corner[] = {key.x, key.y, key.z};
   for (int axis = 0; axis < 3; ++axis) {
@@ -156,7 +158,7 @@ void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
 }
 
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  return {round_down(position.x() / cell_), round_down(position.y() / cell_), round_down(position.z() / cell_)};
+  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

@@ -35,7 +35,7 @@ constexpr double kNormalUnit = 1.0 / (std::int64_t{1} << 30);
 
 class ClusterLattice {
  public:
-  explicit ClusterLattice(double cell) : cell_(cell) {}
+  explicit ClusterLattice(double cell) : cell_(cell), per_metre_(1 / cell) {}
 
   /// @throws Error  a surfel cannot be used; nothing has changed
   void apply(const Changes& changes);
@@ -61,6 +61,7 @@ class ClusterLattice {
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     float radius = 0;  ///< 0: there is no surfel with this id
     Label label = Label::kFrontier;
+    ClusterCell* cell = nullptr;  ///< that counts it
   };
   static constexpr std::size_t kPage = 4096;
   using Page = std::array<Kept, kPage>;
@@ -76,14 +77,15 @@ class ClusterLattice {
 
   void check(const Changes& changes) const;
   Kept* kept(std::uint32_t id);
-  void put(std::uint32_t id, const Kept& now);
-  void count(const Kept& surfel, int sign);
+  void put(std::uint32_t id, Kept now);
+  void count(const Kept& surfel, std::int64_t sign);
   ClusterCell& cell_at(const BlockKey& key);
   ClusterCell* find(const BlockKey& key);
   void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
-  double cell_;  ///< [m]
+  double cell_;       ///< [m]
+  double per_metre_;  ///< [cell/m]
   std::vector<std::unique_ptr<Page>> pages_;
   std::unordered_map<BlockKey, Cube> cubes_;
   std::pair<BlockKey, Cube*> last_cube_ = {{}, nullptr};  ///< of find()
