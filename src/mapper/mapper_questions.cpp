@@ -108,8 +108,14 @@ std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question
   for (const Eigen::Isometry3d& T : question.T_world_camera)
     positions.push_back(T.translation().cwiseMax(-kFarAway).cwiseMin(kFarAway).cast<float>());
   const std::vector<SpaceState> found = states(positions);
+  const double most = question.most_clearance;
+  const std::vector<NearestBoundary> nearest =
+      most > 0 ? boundaries.nearest(positions, most, map) : std::vector<NearestBoundary>(found.size());
   std::vector<ViewValue> values = view_values.find(question, map);
-  for (std::size_t n = 0; n < values.size(); ++n) values[n].state = found[n];
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    values[n].state = found[n];
+    if (found[n] == SpaceState::kFree) values[n].clearance = std::min(nearest[n].distance, static_cast<float>(most));
+  }
   return values;
 }
 

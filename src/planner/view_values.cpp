@@ -107,8 +107,8 @@ void check_question(const ViewQuestion& question) {
   require(question.range >= 0.05 && question.range <= 100, "range is " + to_text(question.range) + ", but must be from 0.05 to 100 m.");
   require(question.min_range >= 0 && question.min_range <= question.range,
           "min_range is " + to_text(question.min_range) + ", but must be from 0 m to range.");
-  require(question.most_clearance >= 0 && question.most_clearance <= 100,
-          "most_clearance is " + to_text(question.most_clearance) + ", but must be from 0 to 100 m.");
+  require(question.most_clearance >= 0 && question.most_clearance <= 5,
+          "most_clearance is " + to_text(question.most_clearance) + ", but must be from 0 to 5 m.");
   if (question.box_world)
     require((question.box_world->min().array() <= question.box_world->max().array()).all(),
             "box_world has a minimum that is larger than its maximum, or not a number.");

@@ -18,7 +18,7 @@ struct ViewQuestion {
   double min_range = 0;  ///< smallest depth along the optical axis that the camera measures [m]; what is nearer hides, but does not count
   double range = 4;      ///< largest such depth, from 0.05 to 100 [m]
   std::optional<Eigen::AlignedBox3f> box_world;  ///< only what is visible inside it counts, world frame [m]; what is outside hides
-  double most_clearance = 1;                     ///< farther surfels are not looked for, from 0 to 100 [m]
+  double most_clearance = 1;                     ///< farther surfels are not looked for, from 0 to 5 [m]
 };
 
 /// What is visible in one of the views: hit by the ray through a pixel's centre within the range, and not hidden by a nearer surfel. The
