@@ -94,7 +94,7 @@ std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question
     positions.push_back(T.translation().cwiseMax(-kFarAway).cwiseMin(kFarAway).cast<float>());
   const std::vector<SpaceState> found = states(positions);
   std::vector<ViewValue> values = view_values.find(question, map);
-  for (std::size_t n = 0; n < values.size(); ++n) values[n].state = found[n];
+  for (std::size_t n = 0; n < values.size(); ++n) values[n].state = found[n];  // TODO: ViewValue::clearance, by Mapper::clearance()
   return values;
 }
 
