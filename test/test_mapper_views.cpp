@@ -157,6 +157,10 @@ TEST(MapperViews, AgreeWithTheRoom) {
   question.range = as_recorded().z_max - forward - 0.05;
   for (const auto& frame : frames) question.T_world_camera.push_back(frame.T_world_camera * Eigen::Translation3d(0, 0, forward));
   const std::vector<ViewValue> values = mapper.evaluate_views(question);
+  std::vector<Eigen::Vector3f> positions;
+  for (const Eigen::Isometry3d& T : question.T_world_camera) positions.push_back(T.translation().cast<float>());
+  const std::vector<float> clearance = mapper.clearance(positions, question.most_clearance);
+  for (std::size_t n = 0; n < values.size(); ++n) EXPECT_EQ(values[n].clearance, clearance[n]);
   const Intrinsics& c = question.intrinsics;
   double area = 0, truth = 0, frontier = 0, pixels = 0, true_pixels = 0;
   for (std::size_t n = 0; n < values.size(); ++n) {
