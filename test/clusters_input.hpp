@@ -1,6 +1,7 @@
 /// A made-up map of surfels that changes, for the tests of clusters.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -62,6 +63,9 @@ class World {
 
   /// Changes since the last call.
   Changes take() {
+    auto& updated = changes_.updated;  // without those that came and went
+    updated.erase(std::remove_if(updated.begin(), updated.end(), [this](const Surfel& s) { return surfels_.count(s.id) == 0; }),
+                  updated.end());
     changes_.since = sequence_;
     changes_.sequence = ++sequence_;
     free_.insert(free_.end(), freed_.begin(), freed_.end());
@@ -71,9 +75,11 @@ class World {
     return changes;
   }
 
+  /// The whole map; the next changes begin here.
   Changes whole() {
+    take();
     Changes changes;
-    changes.sequence = ++sequence_;
+    changes.sequence = sequence_;
     changes.updated = surfels();
     return changes;
   }

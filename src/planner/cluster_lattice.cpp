@@ -35,12 +35,12 @@ void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
     pages_.clear();
-    cells_.clear();
+    cubes_.clear();
+    last_cube_ = {{}, nullptr};
     changed_.clear();
-    last_ = nullptr;
   }
   for (const std::uint32_t id : changes.removed) put(id, {});
-  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label});
+  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label, nullptr});
 }
 
 void ClusterLattice::check(const Changes& changes) const {
@@ -57,7 +57,7 @@ ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
   return page < pages_.size() && pages_[page] ? &(*pages_[page])[id % kPage] : nullptr;
 }
 
-void ClusterLattice::put(std::uint32_t id, const Kept& now) {
+void ClusterLattice::put(std::uint32_t id, Kept now) {
   Kept* before = kept(id);
   if (before == nullptr) {
     if (now.radius == 0) return;
@@ -69,25 +69,27 @@ void ClusterLattice::put(std::uint32_t id, const Kept& now) {
   const bool alike =
       before->label == now.label && before->radius == now.radius && before->position == now.position && before->normal == now.normal;
   if (alike) return;
+  const BlockKey key = key_of(now.position);
+  const bool same_cell = before->radius > 0 && before->cell->key == key;
+  if (now.radius > 0) now.cell = same_cell ? before->cell : &cell_at(key);
   // Of an occupied surfel only its cell counts.
-  const bool both_occupied = before->radius > 0 && now.radius > 0 && before->label == Label::kOccupied && now.label == Label::kOccupied;
-  if (!both_occupied || key_of(before->position) != key_of(now.position)) {
+  if (!same_cell || now.radius == 0 || before->label == Label::kFrontier || now.label == Label::kFrontier) {
     if (before->radius > 0) count(*before, -1);
     if (now.radius > 0) count(now, 1);
   }
   *before = now;
 }
 
-void ClusterLattice::count(const Kept& surfel, int sign) {
-  const BlockKey key = key_of(surfel.position);
-  ClusterCell& cell = cell_at(key);
+void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
+  ClusterCell& cell = *surfel.cell;
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (surfel.label == Label::kOccupied) {
-    cell.occupied += sign;
+    cell.occupied += static_cast<std::uint32_t>(sign);
     return;
   }
-  cell.frontier += sign;
+  const BlockKey& key = cell.key;
+  cell.frontier += static_cast<std::uint32_t>(sign);
   cell.area += sign * in_units(area_of(surfel.radius), kAreaUnit);
   const int corner[] = {key.x, key.y, key.z};
   for (int axis = 0; axis < 3; ++axis) {
@@ -96,21 +98,40 @@ void ClusterLattice::count(const Kept& surfel, int sign) {
   }
 }
 
-/// Surfels of a cell often follow each other, so that the last one is tried first.
+/// Nullptr if there is none. The last one is tried first.
+ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
+  if (last_cube_.second != nullptr && last_cube_.first == cube) return last_cube_.second;
+  const auto at = cubes_.find(cube);
+  if (at == cubes_.end()) return nullptr;
+  last_cube_ = {cube, &at->second};
+  return &at->second;
+}
+
+ClusterCell* ClusterLattice::find(const BlockKey& key) {
+  Cube* cube = find_cube(cube_of(key));
+  return cube == nullptr ? nullptr : cube->cells[place_of(key)].get();
+}
+
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
-  if (last_ != nullptr && last_->key == key) return *last_;
-  const auto [at, is_new] = cells_.try_emplace(key);
-  last_ = &at->second;
-  if (!is_new) return *last_;
-  last_->key = key;
+  Cube* cube = find_cube(cube_of(key));
+  if (cube == nullptr) cube = &cubes_[cube_of(key)];
+  std::unique_ptr<ClusterCell>& cell = cube->cells[place_of(key)];
+  if (!cell) {
+    cell = std::make_unique<ClusterCell>();
+    cell->key = key;
+    ++cube->count;
+    link(*cell);
+  }
+  return *cell;
+}
+
+void ClusterLattice::link(ClusterCell& cell) {
   for (int n = 0; n < 26; ++n) {
     const int place = n < 13 ? n : n + 1;  // of 27
-    const auto other = cells_.find({key.x + place / 9 - 1, key.y + place / 3 % 3 - 1, key.z + place % 3 - 1});
-    if (other == cells_.end()) continue;
-    last_->neighbours[n] = &other->second;
-    other->second.neighbours[25 - n] = last_;
+    ClusterCell* other = find({cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1});
+    cell.neighbours[n] = other;
+    if (other != nullptr) other->neighbours[25 - n] = &cell;
   }
-  return *last_;
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
@@ -127,14 +148,17 @@ void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
     if (cell->frontier > 0 || cell->occupied > 0) continue;
     for (int n = 0; n < 26; ++n)
       if (cell->neighbours[n] != nullptr) cell->neighbours[n]->neighbours[25 - n] = nullptr;
-    if (cell == last_) last_ = nullptr;
-    cells_.erase(BlockKey(cell->key));
+    const BlockKey key = cell->key;
+    Cube* cube = find_cube(cube_of(key));
+    cube->cells[place_of(key)].reset();
+    if (--cube->count > 0) continue;
+    last_cube_ = {{}, nullptr};
+    cubes_.erase(cube_of(key));
   }
 }
 
 BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  const double per_metre = 1 / cell_;
-  return {round_down(position.x() * per_metre), round_down(position.y() * per_metre), round_down(position.z() * per_metre)};
+  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "frontier_surfels/types.hpp"
@@ -34,7 +35,7 @@ constexpr double kNormalUnit = 1.0 / (std::int64_t{1} << 30);
 
 class ClusterLattice {
  public:
-  explicit ClusterLattice(double cell) : cell_(cell) {}
+  explicit ClusterLattice(double cell) : cell_(cell), per_metre_(1 / cell) {}
 
   /// @throws Error  a surfel cannot be used; nothing has changed
   void apply(const Changes& changes);
@@ -60,22 +61,35 @@ class ClusterLattice {
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     float radius = 0;  ///< 0: there is no surfel with this id
     Label label = Label::kFrontier;
+    ClusterCell* cell = nullptr;  ///< that counts it
   };
   static constexpr std::size_t kPage = 4096;
   using Page = std::array<Kept, kPage>;
 
+  /// 8^3 cells; most questions after neighbours end in the same cube.
+  struct Cube {
+    std::array<std::unique_ptr<ClusterCell>, 512> cells;
+    int count = 0;
+  };
+  static BlockKey cube_of(const BlockKey& key) { return {key.x >> 3, key.y >> 3, key.z >> 3}; }
+  static std::size_t place_of(const BlockKey& key) { return (key.x & 7) << 6 | (key.y & 7) << 3 | (key.z & 7); }
+  Cube* find_cube(const BlockKey& cube);
+
   void check(const Changes& changes) const;
   Kept* kept(std::uint32_t id);
-  void put(std::uint32_t id, const Kept& now);
-  void count(const Kept& surfel, int sign);
+  void put(std::uint32_t id, Kept now);
+  void count(const Kept& surfel, std::int64_t sign);
   ClusterCell& cell_at(const BlockKey& key);
+  ClusterCell* find(const BlockKey& key);
+  void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
-  double cell_;  ///< [m]
+  double cell_;       ///< [m]
+  double per_metre_;  ///< [cell/m]
   std::vector<std::unique_ptr<Page>> pages_;
-  std::unordered_map<BlockKey, ClusterCell> cells_;
+  std::unordered_map<BlockKey, Cube> cubes_;
+  std::pair<BlockKey, Cube*> last_cube_ = {{}, nullptr};  ///< of find()
   std::vector<ClusterCell*> changed_;
-  ClusterCell* last_ = nullptr;  ///< of cell_at()
 };
 
 }  // namespace frontier_surfels

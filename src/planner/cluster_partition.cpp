@@ -16,6 +16,19 @@ CellBox box_of(const ClusterPartition::Cells& cells) {
   return box;
 }
 
+void add_contact(std::uint32_t id, std::vector<std::pair<std::uint32_t, int>>& contacts) {
+  for (auto& [other, pairs] : contacts) {
+    if (other != id) continue;
+    ++pairs;
+    return;
+  }
+  contacts.emplace_back(id, 1);
+}
+
+bool more_contact(const std::pair<std::uint32_t, int>& a, const std::pair<std::uint32_t, int>& b) {
+  return a.second != b.second ? a.second > b.second : a.first < b.first;
+}
+
 /// Two halves, on both sides of the plane through the mean of the cells across their longest axis.
 std::pair<ClusterPartition::Cells, ClusterPartition::Cells> halves(const ClusterPartition::Cells& cells) {
   const auto centre = [](const ClusterCell* cell) { return Eigen::Vector3d(cell->key.x, cell->key.y, cell->key.z); };
@@ -125,11 +138,12 @@ ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
 
 /// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
 std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
-  std::map<std::uint32_t, int> contacts;
+  Contacts contacts;
   ClusterLattice::for_neighbours(cell, [&](const ClusterCell& other) {
-    if (other.cluster != 0) ++contacts[other.cluster];
+    if (other.cluster != 0) add_contact(other.cluster, contacts);
   });
-  for (const std::uint32_t id : by_contact(contacts)) {
+  std::sort(contacts.begin(), contacts.end(), more_contact);
+  for (const auto& [id, pairs] : contacts) {
     CellBox box = groups_.at(id).box;
     box.extend(CellBox(cell.key));
     if (box.longest_edge() <= max_extent_) return id;
@@ -192,7 +206,7 @@ void ClusterPartition::merge_small() {
     const auto at = groups_.find(id);
     if (at == groups_.end()) continue;
     if (at->second.area >= min_area_) continue;
-    for (const std::uint32_t other : by_contact(contacts(at->second))) {
+    for (const auto& [other, pairs] : contacts(at->second)) {
       CellBox box = at->second.box;
       box.extend(groups_.at(other).box);
       if (box.longest_edge() > max_extent_) continue;
@@ -221,23 +235,15 @@ std::uint32_t ClusterPartition::merge(std::uint32_t a, std::uint32_t b) {
   return stays;
 }
 
-/// How many pairs of touching cells a group has with each of its neighbours.
-std::map<std::uint32_t, int> ClusterPartition::contacts(const Group& group) {
-  std::map<std::uint32_t, int> counts;
+ClusterPartition::Contacts ClusterPartition::contacts(const Group& group) {
+  Contacts contacts;
   visited_ += group.cells.size();
   for (const ClusterCell* cell : group.cells)
     ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) {
-      if (other.cluster != 0 && other.cluster != cell->cluster) ++counts[other.cluster];
+      if (other.cluster != 0 && other.cluster != cell->cluster) add_contact(other.cluster, contacts);
     });
-  return counts;
-}
-
-/// Ids, those with most contact first.
-std::vector<std::uint32_t> ClusterPartition::by_contact(const std::map<std::uint32_t, int>& contacts) {
-  std::vector<std::uint32_t> ids;
-  for (const auto& [id, count] : contacts) ids.push_back(id);
-  std::stable_sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) { return contacts.at(a) > contacts.at(b); });
-  return ids;
+  std::sort(contacts.begin(), contacts.end(), more_contact);
+  return contacts;
 }
 
 /// The connected parts of cells that are given by key, in the order of their first cells. Each is ordered by key.

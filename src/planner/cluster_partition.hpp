@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "planner/cluster_lattice.hpp"
@@ -42,6 +43,9 @@ class ClusterPartition {
   std::size_t visited() const { return visited_; }  ///< cells that the last update looked at
 
  private:
+  /// Neighbours of a cluster or cell with the number of pairs of cells that touch, those with most of them first.
+  using Contacts = std::vector<std::pair<std::uint32_t, int>>;
+
   Cells sort_changes(const Cells& changed);
   Cells join(Cells fresh);
   std::uint32_t neighbour_with_room(const ClusterCell& cell);
@@ -51,8 +55,7 @@ class ClusterPartition {
   std::uint32_t merge(std::uint32_t a, std::uint32_t b);
 
   void count(std::uint32_t id);
-  std::map<std::uint32_t, int> contacts(const Group& group);
-  static std::vector<std::uint32_t> by_contact(const std::map<std::uint32_t, int>& contacts);
+  Contacts contacts(const Group& group);
   std::vector<Cells> components(const Cells& cells);
   void divide_to_extent(const Cells& cells, std::vector<Cells>& parts);
   Group group_of(Cells cells);

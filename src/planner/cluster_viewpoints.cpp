@@ -83,6 +83,7 @@ std::vector<ClusterViewpoint> candidates(const Cluster& cluster, const ClusterCo
   for (const float factor : {1.0F, 0.75F, 1.4F})
     for (const Eigen::Vector3f& direction : directions(cluster)) {
       const Eigen::Vector3f eye = cluster.centroid + factor * static_cast<float>(config.view_distance) * direction;
+      if (!space.is_free(eye)) continue;  // the cheapest test, which most places fail
       const Eigen::Isometry3f pose = look_at(eye, cluster.centroid);
       const float share = static_cast<float>(facing(cluster, pose).size()) / static_cast<float>(cluster.points.size());
       if (share == 0) continue;
