@@ -82,6 +82,28 @@ TEST(Clusters, BadSurfelsAndGapsChangeNothing) {
   EXPECT_EQ(text(clusters.clusters()), text(before));
 }
 
+/// They may come twice, or in the wrong order, from a topic.
+TEST(Clusters, OldChangesAreIgnored) {
+  World world;
+  world.add(wall(0, 0.5F));
+  FrontierClusters clusters;
+  clusters.apply(world.take());
+  world.add(wall(0.5F, 0.8F));
+  const Changes growth = world.take();
+  clusters.apply(growth);
+  world.remove_if([](const Surfel& s) { return s.position.x() > 0.5F; });
+  clusters.apply(world.take());
+  clusters.update(AllFree());
+  const auto before = clusters.clusters();
+  const std::uint64_t sequence = clusters.sequence();
+
+  clusters.apply(growth);
+  const ClusterChanges changes = clusters.update(AllFree());
+  EXPECT_EQ(changes.sequence, sequence);
+  EXPECT_TRUE(changes.updated.empty());
+  EXPECT_EQ(text(clusters.clusters()), text(before));
+}
+
 TEST(Clusters, SummaryOfAWall) {
   World world;
   world.add(wall(0.003F, 0.8F));
@@ -279,6 +301,30 @@ TEST(Clusters, ViewpointsFollowTheSpace) {
   EXPECT_TRUE(clusters.clusters().at(0).viewpoints.empty());
   ASSERT_EQ(clusters.update(Room()).updated.size(), 1U) << "it has room again";
   EXPECT_EQ(clusters.clusters().at(0).viewpoints.size(), 3U);
+}
+
+/// Something comes between the cluster and its viewpoints, which stay in the clear.
+TEST(Clusters, ValuesFollowTheSpace) {
+  World world;
+  world.add(wall(0, 0.9F));
+  FrontierClusters clusters;
+  clusters.apply(world.take());
+  clusters.update(AllFree());
+  const float value = clusters.clusters().at(0).viewpoints.at(0).value;
+
+  struct Screen : AllFree {
+    float left = 0;  ///< [m] it hides what lies to the right of this
+    bool sees(const Eigen::Vector3f&, const Eigen::Vector3f& to) const override { return to.x() < left; }
+  } screen;
+  screen.left = 0.45F;
+  ASSERT_EQ(clusters.update(screen).updated.size(), 1U);
+  ASSERT_FALSE(clusters.clusters().at(0).viewpoints.empty());
+  for (const ClusterViewpoint& view : clusters.clusters().at(0).viewpoints) EXPECT_LT(view.value, 0.7F * value);
+  screen.left = -1;
+  ASSERT_EQ(clusters.update(screen).updated.size(), 1U);
+  EXPECT_TRUE(clusters.clusters().at(0).viewpoints.empty());
+  ASSERT_EQ(clusters.update(AllFree()).updated.size(), 1U);
+  EXPECT_FLOAT_EQ(clusters.clusters().at(0).viewpoints.at(0).value, value);
 }
 
 }  // namespace

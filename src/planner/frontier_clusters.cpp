@@ -64,7 +64,7 @@ struct FrontierClusters::Impl {
     return std::abs(told.now.area - told.area_then) > kAnew * told.area_then ||
            (told.now.centroid - told.centroid_then).norm() > static_cast<float>(config.cell);
   }
-  bool look(Told& told, bool changed, const Space& space) const;
+  bool look(Told& told, const Space& space) const;
 
   ClusterConfig config;
   ClusterLattice lattice;
@@ -74,11 +74,12 @@ struct FrontierClusters::Impl {
   std::size_t visited = 0;
 };
 
-/// Sees to it that viewpoints are right. @return whether they are others than before
-bool FrontierClusters::Impl::look(Told& told, bool changed, const Space& space) const {
+/// Sees to it that viewpoints are right. Something may have come into their view although the cluster is as it was. @return whether they
+/// are others than before
+bool FrontierClusters::Impl::look(Told& told, const Space& space) const {
   const std::vector<ClusterViewpoint> before = told.now.viewpoints;
   told.now.viewpoints = still_clear(told.now, config, space);
-  if (changed) told.now.viewpoints = valued(told.now, config, space);
+  told.now.viewpoints = valued(told.now, config, space);
   // A cluster that had none may have got room for one.
   if (told.now.viewpoints.empty() || differs_much(told)) {
     told.now.viewpoints = find_viewpoints(told.now, config, space);
@@ -100,6 +101,7 @@ void FrontierClusters::apply(const Changes& changes) {
   if (changes.since > impl_->sequence)
     throw Error("The changes begin with map " + std::to_string(changes.since) + ", but the clusters are those of map " +
                 std::to_string(impl_->sequence) + ": ask for all changes since then.");
+  if (changes.since > 0 && changes.sequence <= impl_->sequence) return;  // old: what they say may no longer hold
   impl_->lattice.apply(changes);
   if (changes.since == 0) impl_->partition.clear();
   impl_->sequence = changes.sequence;
@@ -135,8 +137,8 @@ ClusterChanges FrontierClusters::update(const Space& space) {
     now.viewpoints = std::move(viewpoints);
   }
   for (auto& [id, told] : self.told) {
-    const bool is_changed = changed.count(id) > 0, looks_different = self.look(told, is_changed, space);
-    if (is_changed || looks_different) result.updated.push_back(told.now);
+    const bool looks_different = self.look(told, space);
+    if (looks_different || changed.count(id) > 0) result.updated.push_back(told.now);
   }
   return result;
 }

@@ -77,7 +77,8 @@ class FrontierClusters {
   FrontierClusters(FrontierClusters&&) noexcept;
   FrontierClusters& operator=(FrontierClusters&&) noexcept;
 
-  /// Takes in changes of the map, as from Mapper::changes(sequence()). Those of a whole map end all clusters: it gets new ones.
+  /// Takes in changes of the map, as from Mapper::changes(sequence()). Those of a whole map end all clusters: it gets new ones. Changes
+  /// that lead to no later map than the one that is known are ignored.
   /// @throws Error  a surfel is not finite or too far away, or changes are missing between the last ones and these; nothing has changed
   void apply(const Changes& changes);
 
