@@ -141,7 +141,9 @@ TEST_F(PlannerAdapters, GbplannersVoxels) {
   EXPECT_EQ(map.getResolution(), kResolution);
   EXPECT_TRUE(map.getStatus());
   EXPECT_EQ(SurfelMapManager(client).getVoxelStatus(Point::Constant(50)), MapManager::kUnknown);
-  EXPECT_FALSE(GbplannerMap<>(MapClient()).getStatus());
+  const MapClient empty;
+  EXPECT_FALSE(GbplannerMap<>(empty).getStatus());
+  EXPECT_FALSE(GbplannerMap<>(empty).augmentFreeBox(Point::Zero(), Point::Ones()));
 }
 
 TEST_F(PlannerAdapters, GbplannersFreeBoxesCountWhereTheGridIsUnknown) {
@@ -154,10 +156,19 @@ TEST_F(PlannerAdapters, GbplannersFreeBoxesCountWhereTheGridIsUnknown) {
   EXPECT_EQ(map.getPathStatus(center, center + Point(1, 0, 0), 0.5 * size, true), MapManager::kUnknown);
   EXPECT_EQ(map.getPathStatus(center, center + Point(1, 0, 0), 0.5 * size, false), MapManager::kFree);
   EXPECT_EQ(map.getRayStatus(center, center + Point(0.2, 0.2, 0), true), MapManager::kFree);
+  ASSERT_TRUE(client.apply(StateChanges{9, 0, 0.1, {}}));  // voxels of another grid are others
+  EXPECT_EQ(map.getVoxelStatus(2 * center), MapManager::kUnknown);
+  EXPECT_EQ(map.getBoxStatus(center, size, true), MapManager::kUnknown);
+  ASSERT_TRUE(map.augmentFreeBox(center, size));
+  EXPECT_EQ(map.getBoxStatus(center, size, true), MapManager::kFree);
+  ASSERT_TRUE(client.apply(StateChanges{10, 0, kResolution, changes.blocks}));
+  EXPECT_EQ(map.getBoxStatus(center, size, true), MapManager::kUnknown);
+  ASSERT_TRUE(map.augmentFreeBox(center, size));
+  EXPECT_EQ(map.getVoxelStatus(center), MapManager::kFree);
+  slow.added.clear();
   map.augmentFreeFrustum();
   map.resetMap();
   EXPECT_EQ(map.getVoxelStatus(center), MapManager::kUnknown);
-  slow.added.clear();
   for (int n = 0; n < 5000; ++n) {
     const Point p = random_point();
     ASSERT_EQ(map.getVoxelStatus(p), slow.at(p));

@@ -56,7 +56,7 @@ class GbplannerMap {
   Status getBoxStatus(const Point& center, const Point& size, bool /*stop_at_unknown*/) const {
     const Eigen::AlignedBox3d box(center - size / 2, center + size / 2);
     const SpaceState state = grid().box_state(box.cast<float>());
-    if (state != SpaceState::kUnknown || boxes_.empty() || !is_place(box.min()) || !is_place(box.max())) return to_status(state);
+    if (state != SpaceState::kUnknown || freed_.empty() || !is_place(box.min()) || !is_place(box.max())) return to_status(state);
     bool unknown = false;
     for_cells(cell_of(box.min()), cell_of(box.max()), [&](const Cell& cell) { unknown = unknown || status(cell) == Status::kUnknown; });
     return unknown ? Status::kUnknown : Status::kFree;
@@ -74,11 +74,13 @@ class GbplannerMap {
   }
 
   /// From now on, voxels that the box touches count as free where the grid is unknown.
-  /// @return false  it is no box, and nothing was done
+  /// @return false  there is no map yet, or it is no box; nothing was done
   bool augmentFreeBox(const Point& position, const Point& box_size) {
     const Point half = box_size / 2;
-    if (!(half.array() >= 0).all() || !is_place(position - half) || !is_place(position + half)) return false;
-    boxes_.emplace_back(position - half, position + half);
+    if (!getStatus() || !(half.array() >= 0).all() || !is_place(position - half) || !is_place(position + half)) return false;
+    if (freed_resolution_ != getResolution()) freed_.clear();  // they were voxels of another grid
+    freed_resolution_ = getResolution();
+    for_cells(cell_of(position - half), cell_of(position + half), [&](const Cell& cell) { freed_.insert(number(cell)); });
     return true;
   }
 
@@ -126,7 +128,7 @@ class GbplannerMap {
   }
 
   /// Forgets the added boxes. The map is the mapper's: its service ~reset empties it.
-  void resetMap() { boxes_.clear(); }
+  void resetMap() { freed_.clear(); }
 
  private:
   using Cell = Eigen::Array3i;
@@ -150,9 +152,7 @@ class GbplannerMap {
 
   Status status(const Cell& cell) const {
     const SpaceState state = grid().state(center_of(cell).template cast<float>());
-    if (state == SpaceState::kUnknown)
-      for (const Eigen::AlignedBox3d& box : boxes_)
-        if ((cell >= cell_of(box.min())).all() && (cell <= cell_of(box.max())).all()) return Status::kFree;
+    if (state == SpaceState::kUnknown && freed_.count(number(cell)) != 0 && freed_resolution_ == getResolution()) return Status::kFree;
     return to_status(state);
   }
 
@@ -196,7 +196,8 @@ class GbplannerMap {
 
   const MapClient& client_;
   float reach_;
-  std::vector<Eigen::AlignedBox3d> boxes_;  ///< count as free where the grid is unknown
+  double freed_resolution_ = 0;
+  std::unordered_set<std::uint64_t> freed_;  ///< numbers of voxels that count as free where the grid is unknown
 };
 
 }  // namespace frontier_surfels::adapters
