@@ -59,10 +59,10 @@ void OctomapBridge::write(std::ostream& stream) {
   tree_->writeBinaryConst(stream);
 }
 
-std::string OctomapBridge::binary_data() {
+std::string OctomapBridge::full_data() {
   tree_->prune();
   std::ostringstream stream;
-  tree_->writeBinaryData(stream);
+  tree_->writeData(stream);
   return stream.str();
 }
 

@@ -24,8 +24,8 @@ class OctomapBridge {
   /// Like OcTree::writeBinary(). Equal neighbours are one leaf.
   void write(std::ostream& stream);
 
-  /// The content of an octomap_msgs/Octomap message: the tree without its header.
-  std::string binary_data();
+  /// The content of an octomap_msgs/Octomap message that is not binary: the tree with its probabilities, without a header.
+  std::string full_data();
 
   /// Writes a .bt file: first to a temporary file, which is then renamed. @throws FileError
   void save(const std::string& path);

@@ -233,10 +233,10 @@ void PlannerPublisher::publish_octomap([[maybe_unused]] const std::deque<Pushed>
   if (octomap_.sequence() != space_.sequence()) octomap_.apply(space_.whole());
   octomap_msgs::Octomap message;
   message.header = header();
-  message.binary = true;
+  message.binary = false;
   message.id = "OcTree";
   message.resolution = config_.planner_resolution;
-  const std::string data = octomap_.binary_data();
+  const std::string data = octomap_.full_data();
   message.data.assign(data.begin(), data.end());
   publishers_[kOctomap].publish(serialized(message));
 #endif
