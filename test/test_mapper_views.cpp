@@ -225,6 +225,10 @@ TEST(MapperViews, QuestionsThatMakeNoSenseAreRefused) {
   names("cx", [](auto& q) { q.intrinsics.cx = std::nan(""); });
   for (const double range : {0.04, 101.0, std::nan("")}) names("range", [&](auto& q) { q.range = range; });
   names("min_range", [](auto& q) { q.min_range = 3.5; });
+  names("T_world_camera", [](auto& q) {
+    q.T_world_camera.resize(1000, Eigen::Isometry3d::Identity());
+    q.intrinsics = plain_camera(640, 480, 500);
+  });
   names("most_clearance", [](auto& q) { q.most_clearance = -1; });
   names("box_world", [](auto& q) { q.box_world = Eigen::AlignedBox3f(Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 1, 1)); });
 }

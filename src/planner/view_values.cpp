@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kStage = "views";
 constexpr std::size_t kMostViews = 100000;
+constexpr double kMostPixelsInAll = 100e6;                      // mapping waits for the answer
 constexpr int kMostPixels = 4096;                               // along an edge of the image
 constexpr std::size_t kMostImageBytes = std::size_t{64} << 20;  // of the views that are drawn at once, unless one needs more
 constexpr double kFarthest = 1e6;                               // [m] nothing is mapped beyond
@@ -99,6 +100,9 @@ void check_question(const ViewQuestion& question) {
   for (const auto& [name, size] : {std::pair("width", c.width), std::pair("height", c.height)})
     require(size >= 1 && size <= kMostPixels, std::string("intrinsics.") + name + " is " + std::to_string(size) +
                                                   ", but must be from 1 to " + std::to_string(kMostPixels) + " pixels.");
+  const double pixels = static_cast<double>(count) * c.width * c.height;
+  require(pixels <= kMostPixelsInAll, "T_world_camera has " + std::to_string(count) + " poses of " + std::to_string(c.width) + " x " +
+                                          std::to_string(c.height) + " pixels, more than 100 million in all: divide the question.");
   for (const auto& [name, focal] : {std::pair("fx", c.fx), std::pair("fy", c.fy)})
     require(focal >= 1e-3 && focal <= 1e6,
             std::string("intrinsics.") + name + " is " + to_text(focal) + ", but must be from 0.001 to 1e6 pixels.");
