@@ -3,12 +3,25 @@
 
 #include <algorithm>
 #include <random>
+#include <string>
 
+#include "frontier_surfels/types.hpp"
 #include "synthetic/world.hpp"
 
 namespace frontier_surfels::replay {
 
 using Random = std::mt19937;
+
+/// @return the sentence with which it refuses
+template <typename Call>
+std::string refused(Call&& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
 
 inline double number(Random& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
 

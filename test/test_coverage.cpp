@@ -118,16 +118,6 @@ RecordedFrame random_view(const World& world, const Vector3d& position, Random& 
   return frame;
 }
 
-template <typename Call>
-std::string refused(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
-
 TEST(Coverage, KnowsWhatCanBeSeen) {
   const World world = two_rooms();
   const CoverageOptions options = coarse();

@@ -1,16 +1,8 @@
 /// What views see of the map, against the slow obvious answer: every ray against every disc.
-#include <random>
-
-#include "mapper_input.hpp"
+#include "planner_input.hpp"
 
 namespace frontier_surfels {
 namespace {
-
-Config as_recorded() {
-  Config config = undecimated();
-  config.correct_poses = false;
-  return config;
-}
 
 constexpr double kNear = 0.0078125;  // [m] nothing nearer is seen
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "random_world.hpp"
 #include "synthetic/simulated_camera.hpp"
 #include "synthetic/synthetic_flat.hpp"
 #include "synthetic/synthetic_sensor.hpp"
@@ -22,17 +23,6 @@ SimulatedCameraOptions small_images() {
   SimulatedCameraOptions options;
   options.intrinsics = camera_of_view(40, 30, kKinectView);
   return options;
-}
-
-/// @return the sentence with which it refuses
-template <typename Call>
-std::string refused(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
 }
 
 TEST(SimulatedCamera, LooksAlongTheBodysX) {

@@ -75,9 +75,7 @@ class Mapper {
   /// Where a box with edges along the world's axes, such as a robot's, must stop when its centre moves along paths: where the first part of
   /// it becomes occupied, or unknown if that is asked for. The distances are those of its centre. The box is asked for as by box_states()
   /// at the start, then at most every `step` [m] on the faces that look ahead; surfels stop it anywhere between.
-  /// @throws Error  an end is not finite, a path has more than a million steps, or box_states() would refuse the box, the step or the
-  /// number
-  ///                of points
+  /// @throws Error  an end is not finite, a path has more than a million steps, or box_states() would refuse box, step or number of points
   std::vector<RayState> path_states(const std::vector<Ray>& paths_world, const Eigen::Vector3f& box_size, bool stop_at_unknown,
                                     double step = 0.05) const;
 

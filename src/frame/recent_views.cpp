@@ -246,6 +246,12 @@ std::vector<std::uint64_t> RecentViews::numbers() const {
   return numbers;
 }
 
+std::vector<std::pair<Intrinsics, Eigen::Isometry3d>> RecentViews::cameras() const {
+  std::vector<std::pair<Intrinsics, Eigen::Isometry3d>> cameras;
+  for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) cameras.emplace_back(kept->intrinsics, kept->T_world_camera);
+  return cameras;
+}
+
 SavedView RecentViews::saved(std::uint64_t number) const {
   const auto kept = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& view) { return view.number == number; });
   const int width = kept->intrinsics.width, height = kept->intrinsics.height, columns = patches(width, PATCH_COLUMNS);

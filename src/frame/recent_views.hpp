@@ -6,6 +6,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/shared.h"
@@ -67,7 +68,8 @@ class RecentViews {
 
   /// Numbers of the kept views, oldest first: the how-many-th set_current() each came with. They are never used again.
   std::vector<std::uint64_t> numbers() const;
-  SavedView saved(std::uint64_t number) const;  ///< a kept view
+  SavedView saved(std::uint64_t number) const;                            ///< a kept view
+  std::vector<std::pair<Intrinsics, Eigen::Isometry3d>> cameras() const;  ///< of the kept views, and their poses, oldest first
 
   /// The view whose content is lost after keep_current(): the oldest kept one, or the current one if it was not kept. Its image stays on
   /// the device until the next set_current(). None if it has no depth, if a kept view was not replaced, after dismiss_forgotten(), or

@@ -11,6 +11,13 @@ namespace {
 
 constexpr double kFarAway = 1e9;  // [m] nothing is mapped there: positions become floats
 
+std::vector<float> clearance_of(const std::vector<SpaceState>& states, const std::vector<NearestBoundary>& nearest, double most) {
+  std::vector<float> clearance(states.size(), 0.0F);
+  for (std::size_t n = 0; n < states.size(); ++n)
+    if (states[n] == SpaceState::kFree) clearance[n] = std::min(nearest[n].distance, static_cast<float>(most));
+  return clearance;
+}
+
 }  // namespace
 
 std::vector<SpaceState> Mapper::states(const std::vector<Eigen::Vector3f>& points_world) const {
@@ -36,11 +43,7 @@ std::vector<NearestBoundary> Mapper::nearest_boundaries(const std::vector<Eigen:
 
 std::vector<float> Mapper::clearance(const std::vector<Eigen::Vector3f>& points_world, double most) const {
   const std::vector<NearestBoundary> nearest = nearest_boundaries(points_world, most);
-  const std::vector<SpaceState> of_points = states(points_world);
-  std::vector<float> clearance(points_world.size(), 0.0F);
-  for (std::size_t n = 0; n < points_world.size(); ++n)
-    if (of_points[n] == SpaceState::kFree) clearance[n] = std::min(nearest[n].distance, static_cast<float>(most));
-  return clearance;
+  return clearance_of(states(points_world), nearest, most);
 }
 
 std::vector<SpaceState> Mapper::box_states(const std::vector<Eigen::AlignedBox3f>& boxes_world, double step) const {
@@ -88,9 +91,8 @@ StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution)
 std::vector<BlockKey> Mapper::Impl::known_blocks() const {
   std::vector<BlockKey> blocks = seen.blocks_with_points();
   for (const BlockKey& block : map.blocks_changed_since(0)) blocks.push_back(block);
-  for (const std::uint64_t number : views.numbers()) {
-    const SavedView view = views.saved(number);
-    const std::vector<BlockKey> of_view = blocks_of_view(view.intrinsics, view.T_world_camera, config.z_max, map.block_size()).blocks;
+  for (const auto& [intrinsics, T_world_camera] : views.cameras()) {
+    const std::vector<BlockKey> of_view = blocks_of_view(intrinsics, T_world_camera, config.z_max, map.block_size()).blocks;
     blocks.insert(blocks.end(), of_view.begin(), of_view.end());
   }
   std::sort(blocks.begin(), blocks.end());
@@ -109,12 +111,12 @@ std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question
     positions.push_back(T.translation().cwiseMax(-kFarAway).cwiseMin(kFarAway).cast<float>());
   const std::vector<SpaceState> found = states(positions);
   const double most = question.most_clearance;
-  const std::vector<NearestBoundary> nearest =
-      most > 0 ? boundaries.nearest(positions, most, map) : std::vector<NearestBoundary>(found.size());
+  const std::vector<float> room =
+      most > 0 ? clearance_of(found, boundaries.nearest(positions, most, map), most) : std::vector<float>(found.size());
   std::vector<ViewValue> values = view_values.find(question, map);
   for (std::size_t n = 0; n < values.size(); ++n) {
     values[n].state = found[n];
-    if (found[n] == SpaceState::kFree) values[n].clearance = std::min(nearest[n].distance, static_cast<float>(most));
+    values[n].clearance = room[n];
   }
   return values;
 }

@@ -35,8 +35,7 @@ void check_samples(double count, double step) {
 /// The first sample, from `begin` to `end`, that is occupied, or unknown if that counts.
 std::vector<SpaceState>::const_iterator first_stop(std::vector<SpaceState>::const_iterator begin,
                                                    std::vector<SpaceState>::const_iterator end, bool unknown_counts) {
-  return std::find_if(begin, end,
-                      [=](SpaceState s) { return s == SpaceState::kOccupied || (unknown_counts && s == SpaceState::kUnknown); });
+  return std::find_if(begin, end, [=](SpaceState s) { return ends_ray(s, unknown_counts); });
 }
 
 /// What there is in a part of a box.

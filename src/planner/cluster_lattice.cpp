@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "planner/rounding.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -18,11 +20,6 @@ double area_of(float radius) {
 
 /// Rounded towards zero, which is quick; what is taken away again is the same.
 std::int64_t in_units(double value, double unit) { return static_cast<std::int64_t>(value * (1 / unit)); }
-
-int round_down(double value) {
-  const int whole = static_cast<int>(value);
-  return whole - (value < whole ? 1 : 0);
-}
 
 /// False for what is not finite.
 bool within(const Eigen::Vector3f& v, float limit) {

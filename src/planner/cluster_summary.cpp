@@ -1,8 +1,9 @@
 #include "planner/cluster_summary.hpp"
 
-#include <cmath>
 #include <limits>
 #include <map>
+
+#include "planner/rounding.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -20,10 +21,7 @@ Eigen::Vector3d normal_sum(const ClusterCell& cell) {
          kNormalUnit;
 }
 
-BlockKey coarse(const BlockKey& key, int edge) {
-  const auto down = [edge](int n) { return static_cast<int>(std::floor(static_cast<double>(n) / edge)); };
-  return {down(key.x), down(key.y), down(key.z)};
-}
+BlockKey coarse(const BlockKey& key, int edge) { return {divide_down(key.x, edge), divide_down(key.y, edge), divide_down(key.z, edge)}; }
 
 /// The cells in cubes, of the smallest size at which there are few enough.
 std::map<BlockKey, Cells> thinned(const Cells& cells) {

@@ -2,6 +2,8 @@
 #include <cmath>
 #include <utility>
 
+#include "config/checked.hpp"
+#include "config/config_text.hpp"
 #include "frontier_surfels/planner/clusters.hpp"
 #include "planner/cluster_lattice.hpp"
 #include "planner/cluster_partition.hpp"
@@ -13,30 +15,14 @@ namespace {
 
 constexpr double kAnew = 0.1;  // share of its area by which a cluster must differ for new viewpoints
 
-const ClusterConfig& checked(const ClusterConfig& config) {
-  std::string all;
-  for (const std::string& problem : config.problems()) all += (all.empty() ? "" : "\n") + problem;
-  if (!all.empty()) throw Error(all);
-  return config;
-}
-
-/// 3, not 3.000000.
-std::string number(double value) {
-  std::string text = std::to_string(value);
-  if (text.find('.') == std::string::npos) return text;  // nan, inf
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 }  // namespace
 
 std::vector<std::string> ClusterConfig::problems() const {
   std::vector<std::string> faults;
   const auto check = [&](const char* name, double value, double lowest, double highest, const char* unit) {
     if (value >= lowest && value <= highest) return;  // false for NaN
-    faults.push_back(std::string(name) + " is " + number(value) + " " + unit + ": it must be from " + number(lowest) + " to " +
-                     number(highest) + " " + unit + ".");
+    faults.push_back(std::string(name) + " is " + to_text(value) + " " + unit + ": it must be from " + to_text(lowest) + " to " +
+                     to_text(highest) + " " + unit + ".");
   };
   check("cell", cell, 0.01, 1, "m");
   check("min_area", min_area, 0, 1000, "m2");
@@ -48,7 +34,7 @@ std::vector<std::string> ClusterConfig::problems() const {
 
 struct FrontierClusters::Impl {
   explicit Impl(const ClusterConfig& c)
-      : config(checked(c)),
+      : config(c),
         lattice(c.cell),
         // A little more than 20 cells of 5 cm must be 20 cells.
         partition(static_cast<int>(std::floor(c.max_extent / c.cell + 1e-6)), std::llround(c.min_area / kAreaUnit)) {}
@@ -92,7 +78,10 @@ bool FrontierClusters::Impl::look(Told& told, const Space& space) const {
   return !std::equal(before.begin(), before.end(), told.now.viewpoints.begin(), told.now.viewpoints.end(), alike);
 }
 
-FrontierClusters::FrontierClusters(const ClusterConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+FrontierClusters::FrontierClusters(const ClusterConfig& config) {
+  refuse(config.problems());
+  impl_ = std::make_unique<Impl>(config);
+}
 FrontierClusters::~FrontierClusters() = default;
 FrontierClusters::FrontierClusters(FrontierClusters&&) noexcept = default;
 FrontierClusters& FrontierClusters::operator=(FrontierClusters&&) noexcept = default;

@@ -52,8 +52,7 @@ std::vector<RayState> ray_states(const std::vector<Ray>& rays_world, bool stop_a
     for (Walk& walk : walks) {
       const std::size_t end = std::min(walk.next + kPointsAtOnce, walk.points);
       const auto last = state + static_cast<std::ptrdiff_t>(end - walk.next);
-      const auto stop = std::find_if(
-          state, last, [&](SpaceState s) { return s == SpaceState::kOccupied || (stop_at_unknown && s == SpaceState::kUnknown); });
+      const auto stop = std::find_if(state, last, [&](SpaceState s) { return ends_ray(s, stop_at_unknown); });
       walk.next = end;
       if (stop != last) {
         const Ray& ray = rays_world[walk.number];

@@ -6,6 +6,8 @@
 
 #include "map/map_window.hpp"
 #include "planner/regions.hpp"
+#include "planner/rounding.hpp"
+#include "planner/surfel_cells.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -13,8 +15,6 @@ namespace {
 constexpr const char* kStage = "states";
 constexpr int kEdge = StateBlock::kEdge;
 constexpr int kRegion = 4;  // blocks of the grid along the edge of what is found at once
-
-int divided(std::int32_t number, int by) { return (number >= 0 ? number : number - by + 1) / by; }
 
 /// The smallest form of a block: a byte if all cells are alike.
 StateBlock packed(const std::array<std::int32_t, 3>& block, const std::vector<SpaceState>& cells) {
@@ -53,7 +53,7 @@ std::vector<StateBlock> StateBlocks::find(const std::vector<BlockKey>& map_block
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
         for (int x = first.x(); x <= last.x(); ++x)
-          regions[{divided(x, kRegion), divided(y, kRegion), divided(z, kRegion)}].insert({x, y, z});
+          regions[{divide_down(x, kRegion), divide_down(y, kRegion), divide_down(z, kRegion)}].insert({x, y, z});
   }
   std::vector<StateBlock> found;
   for (const auto& [region, blocks] : regions) find_some({blocks.begin(), blocks.end()}, resolution, states, world, found);
@@ -101,9 +101,7 @@ std::vector<cl_uchar> StateBlocks::mark_surfels(const Block& first, const Eigen:
                         high = low + resolution * cells.cast<double>().matrix();
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(map.largest_radius() + 1e-6);
   const MapWindow window(block_at(low - margin, map.block_size()), block_at(high + margin, map.block_size()), map.block_size());
-  std::vector<cl_uint> pages;
-  for (int cell = 0; cell < window.cells(); ++cell)
-    if (const BlockIndex::Pages* own = map.index().find(window.block(cell))) pages.insert(pages.end(), own->begin(), own->end());
+  std::vector<cl_uint> pages = pages_of(window, map.index());
   const std::size_t count = 2 * static_cast<std::size_t>(cells.prod());
   if (pages.empty()) return std::vector<cl_uchar>(count, 0);
   labels_.resize(count);

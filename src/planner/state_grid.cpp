@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/config_text.hpp"
+#include "planner/rounding.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -17,12 +18,6 @@ constexpr std::int64_t kMostBlocks = std::int64_t{1} << 27;  // of the directory
 constexpr std::int32_t kFarthest = 1 << 24;                  // blocks from the origin
 
 Eigen::Array3i to_cell(const std::array<std::int32_t, 3>& block) { return {block[0], block[1], block[2]}; }
-
-/// Rounds towards minus infinity: std::floor is a function call on older processors.
-int floor_of(double x) {
-  const int whole = static_cast<int>(x);
-  return whole - (x < whole ? 1 : 0);
-}
 
 }  // namespace
 
@@ -174,7 +169,7 @@ inline bool StateGrid::cell_of(const Eigen::Vector3f& point, Cell& cell) const {
   const double x = point.x() * inverse_, y = point.y() * inverse_, z = point.z() * inverse_;
   constexpr double kMost = static_cast<double>(kFarthest) * kEdge;
   if (!(std::abs(x) < kMost && std::abs(y) < kMost && std::abs(z) < kMost)) return false;
-  cell = {floor_of(x), floor_of(y), floor_of(z)};
+  cell = {round_down(x), round_down(y), round_down(z)};
   return true;
 }
 
@@ -245,8 +240,7 @@ RayState StateGrid::ray_state(const Ray& ray_world, bool stop_at_unknown) const 
   double at = 0;
   for (int n = 0;; ++n) {
     const SpaceState state = cell_state(cell);
-    if (state == SpaceState::kOccupied || (stop_at_unknown && state == SpaceState::kUnknown))
-      return {state, static_cast<float>(std::min(at, 1.0) * length)};
+    if (ends_ray(state, stop_at_unknown)) return {state, static_cast<float>(std::min(at, 1.0) * length)};
     if (n == cells) return {SpaceState::kFree, static_cast<float>(length)};
     int axis;
     at = next.minCoeff(&axis);
@@ -272,7 +266,7 @@ RayState StateGrid::path_state(const Ray& path_world, const Eigen::Vector3f& box
     last_high = high;
     if (same) continue;
     const SpaceState state = range_state(low, high);
-    if (state == SpaceState::kOccupied || (stop_at_unknown && state == SpaceState::kUnknown)) return {state, (at - path_world.from).norm()};
+    if (ends_ray(state, stop_at_unknown)) return {state, (at - path_world.from).norm()};
   }
   return {SpaceState::kFree, length};
 }

@@ -18,7 +18,8 @@ bool contains(const Window& w, const BlockKey& block) {
   return within(block.x, w.origin_x, w.size_x) && within(block.y, w.origin_y, w.size_y) && within(block.z, w.origin_z, w.size_z);
 }
 
-/// The pages of the window's blocks; in no certain order, as none is needed.
+}  // namespace
+
 std::vector<cl_uint> pages_of(const MapWindow& window, const BlockIndex& index) {
   std::vector<cl_uint> pages;
   const auto add = [&](const BlockIndex::Pages& own) { pages.insert(pages.end(), own.begin(), own.end()); };
@@ -31,8 +32,6 @@ std::vector<cl_uint> pages_of(const MapWindow& window, const BlockIndex& index) 
   }
   return pages;
 }
-
-}  // namespace
 
 void SurfelCells::list(const Eigen::AlignedBox3d& box_world, const SurfelMap& map) {
   window_ = MapWindow(block_at(box_world.min(), map.block_size()), block_at(box_world.max(), map.block_size()), map.block_size());

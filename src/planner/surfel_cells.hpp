@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "common/shared.h"
 #include "map/map_window.hpp"
@@ -10,6 +11,9 @@
 #include "opencl/lists.hpp"
 
 namespace frontier_surfels {
+
+/// The pages of the window's blocks; in no certain order.
+std::vector<cl_uint> pages_of(const MapWindow& window, const BlockIndex& index);
 
 class SurfelCells {
  public:

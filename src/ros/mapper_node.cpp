@@ -3,10 +3,8 @@
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
-#include <algorithm>
 #include <iostream>
 #include <string>
-#include <vector>
 
 #include "frontier_surfels/config.hpp"
 #include "ros/arguments.hpp"
@@ -23,7 +21,9 @@ usage: rosrun frontier_surfels mapper_node [TOPIC:=OTHER_TOPIC ...] [_PARAMETER:
 
 subscribes  depth/image, depth/camera_info, color/image (if use_color is true), tf
 publishes   ~surfels, ~occupied, ~frontier, ~update, ~markers, ~report, /diagnostics
+            for planners: ~states_update, ~clusters, ~cluster_markers, ~projected_map, ~octomap_full (if built with octomap_msgs)
 services    ~reset, ~pause, ~save_map, ~load_map, ~get_surfels
+            for planners: ~get_states, ~cast_rays, ~evaluate_views, ~get_state_grid, ~save_octomap
 
 Parameters, in the node's private namespace:
 )";
@@ -39,23 +39,12 @@ int end(frontier_surfels::MapperRos& mapper) {
   }
 }
 
-bool is_help(const std::string& argument) { return argument == "--help" || argument == "-h"; }
-
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace frontier_surfels;
-  if (std::any_of(argv + 1, argv + argc, is_help)) {
-    std::cout << kHelp << parameter_table() << node_parameter_table();
-    return 0;
-  }
-  std::vector<std::string> arguments;
-  ros::removeROSArgs(argc, argv, arguments);
-  arguments.erase(arguments.begin());
-  if (const std::string fault = fault_of_arguments(arguments); !fault.empty()) {
-    std::cerr << fault << std::endl;
-    return 2;
-  }
+  if (const auto code = answer_arguments(argc, argv, "mapper_node", [] { return kHelp + parameter_table() + node_parameter_table(); }))
+    return *code;
   ros::init(argc, argv, "mapper");
   const ros::NodeHandle nh, pnh("~");  // must outlive the mapper: without a node handle the error below would not be logged
   try {

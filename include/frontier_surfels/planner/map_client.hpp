@@ -8,9 +8,7 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 

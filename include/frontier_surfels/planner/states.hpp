@@ -20,6 +20,11 @@ struct Ray {
   Eigen::Vector3f from = Eigen::Vector3f::Zero(), to = Eigen::Vector3f::Zero();
 };
 
+/// Does a ray end at something like this?
+inline bool ends_ray(SpaceState state, bool stop_at_unknown) {
+  return state == SpaceState::kOccupied || (stop_at_unknown && state == SpaceState::kUnknown);
+}
+
 /// Where a ray, or a path, ends, and why.
 struct RayState {
   SpaceState state = SpaceState::kUnknown;  ///< what stopped the ray; kFree: nothing, it has reached its end

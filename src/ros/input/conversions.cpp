@@ -255,6 +255,19 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose) {
   return to_isometry(transform);
 }
 
+Eigen::Vector3f to_vector(const geometry_msgs::Point& point) { return Eigen::Vector3d(point.x, point.y, point.z).cast<float>(); }
+
+geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond rotation(T.linear());
+  geometry_msgs::Pose pose;
+  pose.position = to_point(T.translation());
+  pose.orientation.x = rotation.x();
+  pose.orientation.y = rotation.y();
+  pose.orientation.z = rotation.z();
+  pose.orientation.w = rotation.w();
+  return pose;
+}
+
 std::string late_stamp(const ros::Time& stamp) { return "its stamp of " + std::to_string(stamp.sec) + " s is later than in 2038"; }
 
 std::string strip_slash(const std::string& name) {

@@ -68,6 +68,18 @@ sensor_msgs::CameraInfo to_camera_info(const Intrinsics& intrinsics);
 Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform);
 Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose);
 
+/// Positions and poses, as they are.
+template <typename Vector>
+geometry_msgs::Point to_point(const Eigen::MatrixBase<Vector>& p) {
+  geometry_msgs::Point point;
+  point.x = p.x();
+  point.y = p.y();
+  point.z = p.z();
+  return point;
+}
+Eigen::Vector3f to_vector(const geometry_msgs::Point& point);
+geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T);
+
 /// Largest difference of stamps between a depth image and the colour image that belongs to it [s].
 constexpr double kColorTolerance = 0.030;
 

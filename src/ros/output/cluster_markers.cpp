@@ -4,23 +4,17 @@
 #include <cmath>
 #include <string>
 
+#include "ros/input/conversions.hpp"
 #include "ros/output/marker_shapes.hpp"
 
 namespace frontier_surfels {
 namespace {
 
+using messages::to_point;
 using visualization_msgs::Marker;
 
 constexpr double kTextHeight = 0.12, kArrowLength = 0.3;  // [m]
 constexpr double kGoldenRatio = 0.61803398875;            // steps of the hue: ids that follow each other look different
-
-geometry_msgs::Point to_point(const Eigen::Vector3f& p) {
-  geometry_msgs::Point point;
-  point.x = p.x();
-  point.y = p.y();
-  point.z = p.z();
-  return point;
-}
 
 std_msgs::ColorRGBA color_of(std::uint32_t id) {
   const double hue = 6 * (id * kGoldenRatio - std::floor(id * kGoldenRatio));

@@ -2,22 +2,17 @@
 
 #include <algorithm>
 
+#include "ros/input/conversions.hpp"
+
 namespace frontier_surfels {
 namespace {
 
+using messages::to_point;
 using visualization_msgs::Marker;
 
 constexpr double kPyramidDepth = 0.5;  ///< [m]
 constexpr double kTextHeight = 0.08;   ///< [m]
 constexpr double kTextAbove = 0.3;     ///< [m] above the camera
-
-geometry_msgs::Point to_point(const Eigen::Vector3d& p) {
-  geometry_msgs::Point point;
-  point.x = p.x();
-  point.y = p.y();
-  point.z = p.z();
-  return point;
-}
 
 std_msgs::ColorRGBA to_color(const Eigen::Vector3f& rgb) {
   std_msgs::ColorRGBA color;

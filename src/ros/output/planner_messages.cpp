@@ -3,16 +3,10 @@
 #include <cmath>
 #include <string>
 
+#include "ros/input/conversions.hpp"
+
 namespace frontier_surfels::messages {
 namespace {
-
-geometry_msgs::Point to_point(const Eigen::Vector3f& v) {
-  geometry_msgs::Point point;
-  point.x = v.x();
-  point.y = v.y();
-  point.z = v.z();
-  return point;
-}
 
 geometry_msgs::Point32 to_point32(const Eigen::Vector3f& v) {
   geometry_msgs::Point32 point;
@@ -20,17 +14,6 @@ geometry_msgs::Point32 to_point32(const Eigen::Vector3f& v) {
   point.y = v.y();
   point.z = v.z();
   return point;
-}
-
-geometry_msgs::Pose to_pose(const Eigen::Isometry3f& T) {
-  geometry_msgs::Pose pose;
-  pose.position = to_point(T.translation());
-  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear().cast<double>()));
-  pose.orientation.x = q.x();
-  pose.orientation.y = q.y();
-  pose.orientation.z = q.z();
-  pose.orientation.w = q.w();
-  return pose;
 }
 
 Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose, std::size_t number) {
@@ -43,8 +26,6 @@ Eigen::Isometry3d to_isometry(const geometry_msgs::Pose& pose, std::size_t numbe
 }
 
 }  // namespace
-
-Eigen::Vector3f to_vector(const geometry_msgs::Point& point) { return Eigen::Vector3d(point.x, point.y, point.z).cast<float>(); }
 
 StatesUpdate to_message(const StateChanges& changes) {
   StatesUpdate message;
@@ -78,7 +59,7 @@ FrontierCluster to_message(const Cluster& cluster) {
   message.touches_occupied = cluster.touches_occupied ? 1 : 0;
   for (const frontier_surfels::ClusterViewpoint& viewpoint : cluster.viewpoints) {
     message.viewpoints.emplace_back();
-    message.viewpoints.back().pose = to_pose(viewpoint.T_world_camera);
+    message.viewpoints.back().pose = to_pose(viewpoint.T_world_camera.cast<double>());
     message.viewpoints.back().value = viewpoint.value;
     message.viewpoints.back().clearance = viewpoint.clearance;
   }

@@ -17,8 +17,6 @@ namespace frontier_surfels::messages {
 
 using ViewValueMessage = frontier_surfels::ViewResult;
 
-Eigen::Vector3f to_vector(const geometry_msgs::Point& point);
-
 /// Headers are left empty.
 frontier_surfels::StatesUpdate to_message(const StateChanges& changes);
 

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "frontier_surfels/cloud_color.hpp"
+#include "ros/input/conversions.hpp"
 
 namespace frontier_surfels::messages {
 namespace {
@@ -145,27 +146,8 @@ void check_size(const PointCloud2& cloud) {
     throw Error("The cloud is cut short: it has " + std::to_string(cloud.data.size()) + " bytes instead of " + std::to_string(bytes) + ".");
 }
 
-geometry_msgs::Point to_message(const Eigen::Vector3d& p) {
-  geometry_msgs::Point message;
-  message.x = p.x();
-  message.y = p.y();
-  message.z = p.z();
-  return message;
-}
-
 std::uint32_t count32(std::size_t count) {
   return static_cast<std::uint32_t>(std::min<std::size_t>(count, std::numeric_limits<std::uint32_t>::max()));
-}
-
-geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T) {
-  const Eigen::Quaterniond rotation(T.linear());
-  geometry_msgs::Pose pose;
-  pose.position = to_message(Eigen::Vector3d(T.translation()));
-  pose.orientation.x = rotation.x();
-  pose.orientation.y = rotation.y();
-  pose.orientation.z = rotation.z();
-  pose.orientation.w = rotation.w();
-  return pose;
 }
 
 }  // namespace
@@ -245,8 +227,8 @@ SurfelUpdate UpdateMessages::next() {
   message.since = since_;
   message.part = part_++;
   message.parts = parts_;
-  message.box_min = to_message(box_.min().cast<double>());
-  message.box_max = to_message(box_.max().cast<double>());
+  message.box_min = to_point(box_.min().cast<double>());
+  message.box_max = to_point(box_.max().cast<double>());
 
   const std::size_t removed_end = std::min(removed_.size(), removed_sent_ + most_);
   message.removed.assign(removed_.begin() + static_cast<std::ptrdiff_t>(removed_sent_),

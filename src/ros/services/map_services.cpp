@@ -8,14 +8,10 @@
 
 #include "frontier_surfels/map_file.hpp"
 #include "frontier_surfels/paths.hpp"
+#include "ros/input/conversions.hpp"
 #include "ros/output/surfel_messages.hpp"
 
 namespace frontier_surfels {
-namespace {
-
-Eigen::Vector3f to_vector(const geometry_msgs::Point& p) { return Eigen::Vector3d(p.x, p.y, p.z).cast<float>(); }
-
-}  // namespace
 
 MapServices::MapServices(ServiceThread& thread, const NodeConfig& config, Mapper& mapper, Worker& worker, Hooks hooks)
     : config_(config), mapper_(mapper), worker_(worker), hooks_(std::move(hooks)) {
@@ -88,7 +84,7 @@ std::uint32_t MapServices::take_part(std::vector<Surfel>& surfels, std::uint32_t
 
 /// The response has no field for an error. What is thrown becomes the error that the caller of the service gets.
 bool MapServices::get_surfels(GetSurfels::Request& request, GetSurfels::Response& response) {
-  const Eigen::AlignedBox3f box(to_vector(request.box_min), to_vector(request.box_max));
+  const Eigen::AlignedBox3f box(messages::to_vector(request.box_min), messages::to_vector(request.box_max));
   try {
     auto surfels = worker_.run_job([&] {
       response.sequence = mapper_.sequence();

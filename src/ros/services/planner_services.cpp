@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "frontier_surfels/paths.hpp"
+#include "ros/input/conversions.hpp"
 #include "ros/output/octomap_bridge.hpp"
 #include "ros/output/planner_messages.hpp"
 

@@ -3,10 +3,7 @@
 #include <ros/init.h>
 #include <ros/node_handle.h>
 
-#include <algorithm>
-#include <iostream>
 #include <string>
-#include <vector>
 
 #include "ros/arguments.hpp"
 #include "ros/simulation/simulation_ros.hpp"
@@ -25,23 +22,11 @@ services    ~move: to a pose, with an answer; ~capture: one more image from wher
 Parameters, in the node's private namespace:
 )";
 
-bool is_help(const std::string& argument) { return argument == "--help" || argument == "-h"; }
-
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace frontier_surfels;
-  if (std::any_of(argv + 1, argv + argc, is_help)) {
-    std::cout << kHelp << simulation_parameter_table();
-    return 0;
-  }
-  std::vector<std::string> arguments;
-  ros::removeROSArgs(argc, argv, arguments);
-  arguments.erase(arguments.begin());
-  if (const std::string fault = fault_of_arguments(arguments, "simulated_camera"); !fault.empty()) {
-    std::cerr << fault << std::endl;
-    return 2;
-  }
+  if (const auto code = answer_arguments(argc, argv, "simulated_camera", [] { return kHelp + simulation_parameter_table(); })) return *code;
   ros::init(argc, argv, "simulated_camera");
   const ros::NodeHandle nh, pnh("~");  // must outlive the camera: without a node handle the error below would not be logged
   try {

@@ -22,22 +22,9 @@ SimulationConfig read(const ros::NodeHandle& pnh) {
   return config;
 }
 
-geometry_msgs::Pose to_pose(const Eigen::Isometry3d& T) {
-  const Eigen::Quaterniond q(T.linear());
-  geometry_msgs::Pose pose;
-  pose.position.x = T.translation().x();
-  pose.position.y = T.translation().y();
-  pose.position.z = T.translation().z();
-  pose.orientation.x = q.x();
-  pose.orientation.y = q.y();
-  pose.orientation.z = q.z();
-  pose.orientation.w = q.w();
-  return pose;
-}
-
 tf2_msgs::TFMessage to_tf(const Eigen::Isometry3d& T_parent_child, const std::string& parent, const std::string& child,
                           const ros::Time& stamp) {
-  const geometry_msgs::Pose pose = to_pose(T_parent_child);
+  const geometry_msgs::Pose pose = messages::to_pose(T_parent_child);
   geometry_msgs::TransformStamped transform;
   transform.header.stamp = stamp;
   transform.header.frame_id = parent;
@@ -104,7 +91,7 @@ bool SimulationRos::move(MoveCamera::Request& request, MoveCamera::Response& res
     response.success = false;
     response.message = error.what();
   }
-  response.pose = to_pose(camera_.T_world_body());
+  response.pose = messages::to_pose(camera_.T_world_body());
   return true;
 }
 
