@@ -7,6 +7,8 @@
 #include <chrono>
 #include <cmath>
 #include <future>
+#include <map>
+#include <utility>
 
 #include "config/config_text.hpp"
 #include "scoring/cpu_clock.hpp"
@@ -156,6 +158,29 @@ std::vector<Surfel> OctomapTruth::boundary() const {
     surfels.push_back(surfel);
   }
   return surfels;
+}
+
+StateChanges OctomapTruth::states(std::uint64_t sequence) const {
+  const OcTree& tree = impl_->tree;
+  std::map<std::array<std::int32_t, 3>, std::vector<std::uint8_t>> blocks;
+  const auto set = [&](const Voxel& v, bool occupied) {
+    constexpr int kEdge = StateBlock::kEdge, kMiddle = kKeys / 2;  // of the keys, where the world has its origin
+    const Voxel cell = {v[0] - kMiddle, v[1] - kMiddle, v[2] - kMiddle};
+    std::vector<std::uint8_t>& cells = blocks[{cell[0] >> 4, cell[1] >> 4, cell[2] >> 4}];
+    cells.resize(StateBlock::kBytes);
+    const int n = (cell[0] & 15) + kEdge * (cell[1] & 15) + kEdge * kEdge * (cell[2] & 15);
+    cells[(occupied ? StateBlock::kBytes / 2 : 0) + static_cast<std::size_t>(n) / 8] |= static_cast<std::uint8_t>(1 << n % 8);
+  };
+  for (auto leaf = tree.begin_leafs(), end = tree.end_leafs(); leaf != end; ++leaf) {
+    const OcTreeKey low = leaf.getIndexKey();
+    const int size = 1 << (kTreeDepth - leaf.getDepth());
+    for (int x = 0; x < size; ++x)
+      for (int y = 0; y < size; ++y)
+        for (int z = 0; z < size; ++z) set({low[0] + x, low[1] + y, low[2] + z}, tree.isNodeOccupied(*leaf));
+  }
+  StateChanges all = {sequence, 0, tree.getResolution(), {}};
+  for (auto& [block, cells] : blocks) all.blocks.push_back({block, std::move(cells)});
+  return all;
 }
 
 OctomapScore OctomapTruth::score(const std::vector<Surfel>& psi, const std::vector<Surfel>& m, double tolerance) const {

@@ -1,10 +1,12 @@
 /// The paper's own yardstick (4.1.2, 4.2.1): an OctoMap built from the same frames, and its boundary surfels M.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "frontier_surfels/config.hpp"
+#include "frontier_surfels/planner/state_grid.hpp"
 #include "frontier_surfels/types.hpp"
 
 namespace frontier_surfels::scoring {
@@ -40,6 +42,9 @@ class OctomapTruth {
   /// the normalised sum of unit vectors to the known voxels among the 26 neighbours; radius sqrt(3)/2 resolution; label occupied when a
   /// 6-neighbour is occupied in OctoMap, else frontier.
   std::vector<Surfel> boundary() const;
+
+  /// The whole tree as a grid of cells as large as its voxels, for planners. @param sequence  the number that the grid gets
+  StateChanges states(std::uint64_t sequence) const;
 
   OctomapScore score(const std::vector<Surfel>& psi, const std::vector<Surfel>& m, double tolerance = 0.05) const;
 
