@@ -100,6 +100,21 @@ TEST(SimulatedCamera, HasTheErrorsOfASensor) {
   EXPECT_GT(cv::countNonZero(camera.image().measured.depth != frame.measured.depth), 100) << "each picture has its own noise";
 }
 
+TEST(SimulatedCamera, StartsAgain) {
+  const World flat = synthetic_flat();
+  SimulatedCameraOptions options = small_images();
+  options.sensor.noise = true;
+  SimulatedCamera camera(flat, flat_start(), options);
+  const cv::Mat first = camera.image().measured.depth.clone();
+  camera.move_to(at({3, 3.95, 1.0}, 0.4));
+  camera.image();
+  camera.restart();
+  EXPECT_EQ(camera.T_world_body().matrix(), flat_start().matrix());
+  EXPECT_EQ(camera.metres(), 0);
+  EXPECT_EQ(camera.images(), 0);
+  EXPECT_EQ(cv::countNonZero(camera.image().measured.depth != first), 0);
+}
+
 TEST(SimulatedCamera, RefusesWhatMakesNoSense) {
   const World flat = synthetic_flat();
   SimulatedCamera camera(flat, flat_start(), small_images());

@@ -54,7 +54,7 @@ Isometry3d T_body_optical() {
 }
 
 SimulatedCamera::SimulatedCamera(const World& world, const Isometry3d& T_world_body, const SimulatedCameraOptions& options)
-    : world_(world), options_(options), T_world_body_(T_world_body) {
+    : world_(world), options_(options), T_world_start_(T_world_body), T_world_body_(T_world_body) {
   check(options);
   check_pose(T_world_body, "The start of the simulated camera");
   if (!(world.distance(T_world_body.translation()) >= options.radius)) {
@@ -78,6 +78,12 @@ Move SimulatedCamera::move_to(const Isometry3d& T_world_body) {
                               : "The camera has stopped after " + in_centimetres(free) + " of " + in_centimetres(wanted) +
                                     " m: a solid would come closer than " + to_text(options_.radius) + " m.";
   return move;
+}
+
+void SimulatedCamera::restart() {
+  T_world_body_ = T_world_start_;
+  metres_ = 0;
+  images_ = 0;
 }
 
 const SensedFrame& SimulatedCamera::image() {

@@ -47,6 +47,9 @@ class SimulatedCamera {
   /// as commanded. @throws Error if the pose is no pose; it then stays where it is
   Move move_to(const Eigen::Isometry3d& T_world_body);
 
+  /// Goes back to the start, as if it had neither moved nor taken a picture.
+  void restart();
+
   /// Takes a picture. The result is valid until the next one. Its index counts pictures; its stamp is 1 / 30 s after the last one's.
   const SensedFrame& image();
 
@@ -59,7 +62,7 @@ class SimulatedCamera {
  private:
   const World& world_;
   SimulatedCameraOptions options_;
-  Eigen::Isometry3d T_world_body_;
+  Eigen::Isometry3d T_world_start_, T_world_body_;  ///< of the body
   double metres_ = 0;
   int images_ = 0;
   SensedFrame image_;

@@ -10,7 +10,7 @@ import numpy
 import rospy
 from frontier_surfels.msg import Coverage, FrameReport
 from frontier_surfels.srv import MoveCamera
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from roslib.packages import find_node
 from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
@@ -74,7 +74,7 @@ class Simulation(unittest.TestCase):
         return sum(len(nodes) for name, nodes in subscribers if name == '/' + topic)
 
     def setUp(self):
-        self.assertEqual(self.move(goal_of(0.8, 3.95, 1.2)).message[-1], '.')
+        self.assertEqual(self.move(goal=goal_of(0.8, 3.95, 1.2)).message[-1], '.')
 
     def transform_at(self, stamp):
         def moves(message):
@@ -83,7 +83,7 @@ class Simulation(unittest.TestCase):
         return self.tf.find(moves).transforms[0]
 
     def test_moves_take_images(self):
-        response = self.move(goal_of(2.0, 3.95, 1.3, 0.5))
+        response = self.move(goal=goal_of(2.0, 3.95, 1.3, 0.5))
         self.assertTrue(response.success, response.message)
         self.assertAlmostEqual(response.metres, math.hypot(1.2, 0.1), places=6)
         self.assertAlmostEqual(response.pose.position.x, 2.0)
@@ -103,7 +103,7 @@ class Simulation(unittest.TestCase):
             self.assertAlmostEqual(abs(component), abs(expected))
 
     def test_the_mapper_maps_them(self):
-        response = self.move(goal_of(2.9, 3.95, 1.3, -math.pi / 2))
+        response = self.move(goal=goal_of(2.9, 3.95, 1.3, -math.pi / 2))
         header = self.image.at(response.stamp).header
         report = self.mapper.report(header)
         self.assertEqual((report.result, report.reason), (FrameReport.INTEGRATED, ''))
@@ -111,24 +111,50 @@ class Simulation(unittest.TestCase):
         self.assertGreater(report.surfels, 1000)
 
     def test_stops_before_solids(self):
-        response = self.move(goal_of(0.8, 6.5, 1.2, 1.0))
+        response = self.move(goal=goal_of(0.8, 6.5, 1.2, 1.0))
         self.assertFalse(response.success)
         self.assertRegex(response.message, r'stopped after 0\.42 of 2\.55 m: a solid would come closer than 0\.2 m\.$')
         self.assertAlmostEqual(response.pose.position.y, 4.37, places=2)
         self.image.at(response.stamp)
 
+    def test_passes_corners(self):
+        views = self.coverage.messages[-1].views
+        response = self.move(via=[Point(8.4, 3.95, 1.2), Point(8.4, 2.6, 1.2)], goal=goal_of(7.4, 2.6, 1.2))
+        self.assertTrue(response.success, response.message)
+        self.assertAlmostEqual(response.metres, 7.6 + 1.35 + 1, places=6)
+        self.assertEqual(self.coverage.at(response.stamp).views, views + 1)
+        response = self.move(via=[Point(8.4, 2.6, 1.2), Point(0.8, 2.6, 1.2)], goal=goal_of(0.8, 3.95, 1.2))
+        self.assertFalse(response.success)  # walls are in the way
+        self.assertAlmostEqual(response.pose.position.y, 2.6, places=6)
+        here = response.pose
+        response = self.move(via=[Point(math.inf, 2.6, 1.2)], goal=goal_of(8.4, 2.6, 1.2))
+        self.assertRegex(response.message, 'corner.*finite')
+        self.assertEqual((response.stamp.to_sec(), response.pose), (0, here))
+        self.assertTrue(self.move(via=[Point(8.4, 2.6, 1.2), Point(8.4, 3.95, 1.2)], goal=goal_of(0.8, 3.95, 1.2)).success)
+
+    def test_starts_again(self):
+        before = self.coverage.at(self.move(goal=goal_of(2.0, 3.95, 1.2)).stamp)
+        response = rospy.ServiceProxy(f'{CAMERA}/reset', Trigger)()
+        self.assertTrue(response.success, response.message)
+        after = self.coverage.find(lambda message: message.header.stamp > before.header.stamp)
+        self.assertEqual((after.views, after.metres, after.seconds, after.seen, after.share), (0, 0, 0, 0, 0))
+        self.assertEqual(after.visible, before.visible)
+        response = self.move(goal=goal_of(1.0, 3.95, 1.2))
+        self.assertAlmostEqual(response.metres, 0.2)
+        self.assertEqual(self.coverage.at(response.stamp).views, 1)
+
     def test_refuses_goals_that_make_no_sense(self):
-        before = self.move(goal_of(1.0, 3.95, 1.2))
+        before = self.move(goal=goal_of(1.0, 3.95, 1.2))
         views = self.coverage.at(before.stamp).views
         for goal, sentence in ((goal_of(math.nan, 0, 0), 'finite'), (goal_of(1, 4, 1, frame='odom'), "'odom'.*'map'")):
             with case(sentence):
-                response = self.move(goal)
+                response = self.move(goal=goal)
                 self.assertFalse(response.success)
                 self.assertRegex(response.message, sentence)
                 self.assertEqual((response.metres, response.stamp.to_sec(), response.pose), (0, 0, before.pose))
         zero = goal_of(1, 4, 1)
         zero.pose.orientation.w = 0
-        self.assertRegex(self.move(zero).message, 'quaternion')
+        self.assertRegex(self.move(goal=zero).message, 'quaternion')
         self.assertEqual(self.coverage.messages[-1].views, views)
 
     def test_follows_goals_of_the_topic(self):
@@ -139,8 +165,8 @@ class Simulation(unittest.TestCase):
         self.assertEqual(message.transforms[0].child_frame_id, 'base_link')
 
     def test_coverage_grows_with_new_views(self):
-        before = self.coverage.at(self.move(goal_of(8.4, 3.95, 1.2, -math.pi / 2)).stamp)
-        response = self.move(goal_of(8.4, 2.6, 1.2, -math.pi / 2))
+        before = self.coverage.at(self.move(goal=goal_of(8.4, 3.95, 1.2, -math.pi / 2)).stamp)
+        response = self.move(goal=goal_of(8.4, 2.6, 1.2, -math.pi / 2))
         self.assertTrue(response.success, response.message)
         after = self.coverage.at(response.stamp)
         self.assertGreater(after.share, before.share)
@@ -149,7 +175,7 @@ class Simulation(unittest.TestCase):
         self.assertAlmostEqual(after.share, after.seen / after.visible)
         self.assertAlmostEqual(after.metres, before.metres + response.metres)
         self.assertGreater(after.seconds, before.seconds)
-        self.assertTrue(self.move(goal_of(8.4, 3.95, 1.2)).success)
+        self.assertTrue(self.move(goal=goal_of(8.4, 3.95, 1.2)).success)
 
     def test_images_are_taken_on_request(self):
         views = self.coverage.messages[-1].views

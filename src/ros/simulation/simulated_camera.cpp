@@ -17,7 +17,7 @@ usage: rosrun frontier_surfels simulated_camera [TOPIC:=OTHER_TOPIC ...] [_PARAM
 
 subscribes  ~goal: pose of the body (x forward, z up) in the world frame
 publishes   depth/image, depth/camera_info, tf; ~coverage: how much has been seen of what can be seen at all
-services    ~move: to a pose, with an answer; ~capture: one more image from where the camera is
+services    ~move: to a pose, with an answer; ~capture: one more image from where the camera is; ~reset: back to the start
 
 Parameters, in the node's private namespace:
 )";

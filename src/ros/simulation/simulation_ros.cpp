@@ -64,25 +64,40 @@ void SimulationRos::advertise() {
   goal_ = pnh_.subscribe<geometry_msgs::PoseStamped>("goal", 10, [this](const geometry_msgs::PoseStampedConstPtr& goal) { follow(*goal); });
   move_ = pnh_.advertiseService("move", &SimulationRos::move, this);
   capture_ = pnh_.advertiseService("capture", &SimulationRos::capture, this);
+  reset_ = pnh_.advertiseService("reset", &SimulationRos::reset, this);
   pose_timer_ = nh_.createTimer(ros::Duration(kPosePeriod), [this](const ros::TimerEvent&) { publish_pose(next_stamp()); });
   if (config_.publish_rate > 0)
     image_timer_ = nh_.createTimer(ros::Duration(1 / config_.publish_rate), [this](const ros::TimerEvent&) { publish_image(); });
 }
 
-replay::Move SimulationRos::move_to(const geometry_msgs::PoseStamped& goal) {
+replay::Move SimulationRos::move_to(const geometry_msgs::PoseStamped& goal, const std::vector<geometry_msgs::Point>& via) {
   const std::string frame = messages::strip_slash(goal.header.frame_id);
   if (!frame.empty() && frame != config_.world_frame)
     throw Error("The goal is given in the frame '" + frame + "': it must be in '" + config_.world_frame + "'.");
+  std::vector<Eigen::Isometry3d> poses;
   try {
-    return camera_.move_to(messages::to_isometry(goal.pose));
+    const Eigen::Isometry3d T_world_goal = messages::to_isometry(goal.pose);
+    for (const geometry_msgs::Point& corner : via) {
+      poses.push_back(T_world_goal);
+      poses.back().translation() << corner.x, corner.y, corner.z;
+      if (!poses.back().translation().allFinite()) throw Error("A corner of the way is not finite.");
+    }
+    poses.push_back(T_world_goal);
   } catch (const BadFrame&) {
     throw Error("The goal is no pose: its numbers must be finite, and its quaternion not 0.");
   }
+  replay::Move all;
+  for (const Eigen::Isometry3d& pose : poses) {
+    const replay::Move move = camera_.move_to(pose);
+    all = {move.reached, all.metres + move.metres, move.message};
+    if (!move.reached) break;
+  }
+  return all;
 }
 
 bool SimulationRos::move(MoveCamera::Request& request, MoveCamera::Response& response) {
   try {
-    const replay::Move move = move_to(request.goal);
+    const replay::Move move = move_to(request.goal, request.via);
     response.success = move.reached;
     response.message = move.message;
     response.metres = move.metres;
@@ -92,6 +107,17 @@ bool SimulationRos::move(MoveCamera::Request& request, MoveCamera::Response& res
     response.message = error.what();
   }
   response.pose = messages::to_pose(camera_.T_world_body());
+  return true;
+}
+
+/// As at the start, for another exploration. The stamps go on, because a mapper takes no earlier ones.
+bool SimulationRos::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  camera_.restart();
+  coverage_.reset();
+  first_stamp_.reset();
+  publish_coverage(next_stamp());
+  response.success = true;
+  response.message = "The camera is at its start, and has seen nothing.";
   return true;
 }
 

@@ -11,6 +11,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "frontier_surfels/MoveCamera.h"
 #include "ros/simulation/simulation_parameters.hpp"
@@ -20,8 +21,8 @@
 
 namespace frontier_surfels {
 
-/// Publishes depth/image, depth/camera_info, tf and ~coverage; listens to ~goal; answers ~move and ~capture. All callbacks must be called
-/// by one thread.
+/// Publishes depth/image, depth/camera_info, tf and ~coverage; listens to ~goal; answers ~move, ~capture and ~reset. All callbacks must be
+/// called by one thread.
 class SimulationRos {
  public:
   /// @throws Error if a parameter cannot be used. Takes seconds, because it finds out what can be seen of the flat
@@ -30,10 +31,12 @@ class SimulationRos {
  private:
   void advertise();
   bool move(MoveCamera::Request& request, MoveCamera::Response& response);
+  bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   bool capture(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response);
   void follow(const geometry_msgs::PoseStamped& goal);
-  replay::Move move_to(const geometry_msgs::PoseStamped& goal);  ///< @throws Error if it makes no sense
-  ros::Time publish_image();                                     ///< @return its stamp
+  /// @throws Error if the goal makes no sense, or a corner; the camera then stays where it is
+  replay::Move move_to(const geometry_msgs::PoseStamped& goal, const std::vector<geometry_msgs::Point>& via = {});
+  ros::Time publish_image();  ///< @return its stamp
   void publish_pose(const ros::Time& stamp);
   void publish_coverage(const ros::Time& stamp);
   ros::Time next_stamp();
@@ -47,7 +50,7 @@ class SimulationRos {
   ros::Time last_stamp_;
   ros::Publisher image_, info_, tf_, tf_static_, coverage_share_;
   ros::Subscriber goal_;
-  ros::ServiceServer move_, capture_;
+  ros::ServiceServer move_, capture_, reset_;
   ros::Timer image_timer_, pose_timer_;
 };
 
