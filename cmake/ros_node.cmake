@@ -1,7 +1,7 @@
 # The mapper among ROS nodes, and the conversions of ROS messages.
 
 file(GLOB ROS_SOURCES CONFIGURE_DEPENDS src/ros/*.cpp src/ros/*/*.cpp)
-list(FILTER ROS_SOURCES EXCLUDE REGEX "/(mapper_node\\.cpp|simulation/[a-z_]+\\.cpp)$")  # the simulation needs the tools
+list(FILTER ROS_SOURCES EXCLUDE REGEX "/(mapper_node\\.cpp|(simulation|exploration)/[a-z_]+\\.cpp)$")  # these need the tools
 add_library(frontier_surfels_ros SHARED ${ROS_SOURCES})
 add_dependencies(frontier_surfels_ros ${${PROJECT_NAME}_EXPORTED_TARGETS})
 target_include_directories(frontier_surfels_ros SYSTEM PUBLIC ${catkin_INCLUDE_DIRS} ${OpenCV_INCLUDE_DIRS})

@@ -54,10 +54,14 @@ add_executable(bench ${BENCH_SOURCES})
 target_link_libraries(bench PRIVATE frontier_surfels_replay CLI11::CLI11 benchmark::benchmark)
 list(APPEND PROGRAMS bench)
 
-# A depth camera in the synthetic flat, as a node.
+# Exploring, as nodes: a depth camera in the synthetic flat, a planner, and an OctoMap to compare the mapper with.
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB SIMULATION_SOURCES CONFIGURE_DEPENDS src/ros/simulation/*.cpp)
   add_executable(simulated_camera ${SIMULATION_SOURCES})
   target_link_libraries(simulated_camera PRIVATE frontier_surfels_replay)
-  list(APPEND PROGRAMS simulated_camera)
+  add_executable(explore src/ros/exploration/explore_node.cpp src/ros/exploration/exploration_log.cpp)
+  target_link_libraries(explore PRIVATE frontier_surfels_replay)
+  add_executable(octomap_frontiers src/ros/exploration/octomap_frontiers.cpp)
+  target_link_libraries(octomap_frontiers PRIVATE frontier_surfels_ros frontier_surfels_scoring)
+  list(APPEND PROGRAMS simulated_camera explore octomap_frontiers)
 endif()

@@ -17,13 +17,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPython = "/usr/bin/python3";  // has the distribution's numpy and matplotlib, which other Pythons on PATH may lack
-constexpr const char* kScript = "replay_report.py";
 
 fs::path own_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
 
 /// The script: beside the executable if that is installed, else in the source tree; empty if it is missing.
-fs::path find_script() {
-  for (const fs::path& candidate : {own_folder() / kScript, own_folder() / FRONTIER_SURFELS_SCRIPTS_FROM_BINARY / kScript}) {
+fs::path find_script(const std::string& name) {
+  for (const fs::path& candidate : {own_folder() / name, own_folder() / FRONTIER_SURFELS_SCRIPTS_FROM_BINARY / name}) {
     if (fs::exists(candidate)) return candidate;
   }
   return {};
@@ -74,20 +73,20 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-void make_report_page(const std::string& directory, const std::string& kept) {
+void make_page(const std::string& script, const std::string& page, const std::string& directory, const std::string& kept) {
   const std::string others =
       (kept == directory ? "the earlier report stays, and the other files of the new one are in '" : "the other files are in '") + kept +
       "'";
-  const fs::path script = find_script();
-  if (script.empty())
-    throw Error(std::string("report.html needs the script ") + kScript + ", which is neither beside this program in '" +
-                own_folder().string() + "' nor in the source tree: install the package again; " + others + ".");
-  if (access(kPython, X_OK) != 0) throw Error(std::string("report.html needs ") + kPython + ", which is missing; " + others + ".");
-  const int status = run_python(script.string(), directory);
+  const fs::path path = find_script(script);
+  if (path.empty())
+    throw Error(page + " needs the script " + script + ", which is neither beside this program in '" + own_folder().string() +
+                "' nor in the source tree: install the package again; " + others + ".");
+  if (access(kPython, X_OK) != 0) throw Error(page + " needs " + kPython + ", which is missing; " + others + ".");
+  const int status = run_python(path.string(), directory);
   if (status == 0) return;
   const bool interrupted = WIFSIGNALED(status) && WTERMSIG(status) == SIGINT;
-  throw Error("report.html " + std::string(interrupted ? "is not made, because of Ctrl-C" : "could not be made") + "; " + others +
-              ". Try again with: " + quoted(script.lexically_normal().string()) + " " + quoted(kept));
+  throw Error(page + " " + std::string(interrupted ? "is not made, because of Ctrl-C" : "could not be made") + "; " + others +
+              ". Try again with: " + quoted(path.lexically_normal().string()) + " " + quoted(kept));
 }
 
 }  // namespace frontier_surfels::replay

@@ -51,7 +51,7 @@ class LaunchFiles(unittest.TestCase):
 
     def test_roslaunch_check(self):
         self.assertEqual([os.path.basename(path) for path in FILES],
-                         ['mapper.launch', 'openni.launch', 'realsense.launch', 'replay.launch', 'tum.launch'])
+                         ['explore.launch', 'mapper.launch', 'openni.launch', 'realsense.launch', 'replay.launch', 'tum.launch'])
         for path in FILES:
             arguments = ['bag:=' + self.bag] if os.path.basename(path) in ('replay.launch', 'tum.launch') else []
             for more in (['rviz:=true'], ['rviz:=false', 'manager:=camera/manager']):
