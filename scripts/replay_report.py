@@ -19,7 +19,7 @@ except ImportError as error:
 
 HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path.insert(0, HERE)
-from report_page import NONE, embedded, number, percent, png, render_page, table, write_page  # noqa: E402
+from report_page import NONE, embedded, number, percent, png, render_page, table, write_whole  # noqa: E402
 import report_plots  # noqa: E402
 import surfel_pictures  # noqa: E402
 
@@ -230,7 +230,7 @@ def main():
         return 2
     folder = sys.argv[1]
     try:
-        write_page(os.path.join(folder, 'report.html'), page(folder))
+        write_whole(os.path.join(folder, 'report.html'), page(folder))
     except (OSError, ValueError, KeyError, jinja2.TemplateError) as error:
         print(f"replay_report: the report of '{folder}' could not be made: {type(error).__name__}: {error}", file=sys.stderr)
         return 1

@@ -53,12 +53,12 @@ def render_page(template, **values):
     return environment.get_template(template).render(**values)
 
 
-def write_page(path, html):
-    """Writes the page beside an earlier one and replaces that only when the new one is complete."""
+def write_whole(path, text):
+    """Writes a file beside an earlier one and replaces that only when the new one is complete."""
     unfinished = path + '.unfinished'
     try:
         with open(unfinished, 'w', encoding='utf-8') as file:
-            file.write(html)
+            file.write(text)
             file.flush()
             os.fsync(file.fileno())
         os.replace(unfinished, path)
