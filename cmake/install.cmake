@@ -11,7 +11,7 @@ if(FRONTIER_SURFELS_TOOLS)
   set_target_properties(${PROGRAMS} PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
   install(TARGETS ${PROGRAMS} RUNTIME DESTINATION ${INSTALL_PROGRAMS_TO})
   install(DIRECTORY include/frontier_surfels/scoring DESTINATION ${INSTALL_INCLUDES_TO})
-  install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # the report's template
+  install(DIRECTORY share/ DESTINATION ${INSTALL_SHARE_TO})  # templates of the pages
   file(GLOB PYTHON_SCRIPTS CONFIGURE_DEPENDS scripts/*.py)
   install(PROGRAMS ${PYTHON_SCRIPTS} DESTINATION ${INSTALL_PROGRAMS_TO})  # replay_score looks for them beside itself
 endif()

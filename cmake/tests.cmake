@@ -105,7 +105,9 @@ foreach(name test_replay_score test_replay_failures test_replay_truth)
   add_test(NAME ${name}
     COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/${name}.py $<TARGET_FILE:replay_score> $<TARGET_FILE:make_synthetic>)
 endforeach()
-add_test(NAME test_report_page COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/test_report_page.py)
+foreach(name test_report_page test_explore_page)
+  add_test(NAME ${name} COMMAND /usr/bin/python3 -B ${PROJECT_SOURCE_DIR}/test/${name}.py)
+endforeach()
 add_test(NAME test_bench
   COMMAND /usr/bin/python3 ${PROJECT_SOURCE_DIR}/test/test_bench.py $<TARGET_FILE:bench> $<TARGET_FILE:make_synthetic>
     ${PROJECT_SOURCE_DIR}/scripts/bench_table)

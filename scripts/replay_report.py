@@ -6,27 +6,22 @@ import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
-import base64  # noqa: E402
-import io  # noqa: E402
 import json  # noqa: E402
 import os  # noqa: E402
 import sys  # noqa: E402
 
 try:
     import jinja2
-    import matplotlib.image
+    import matplotlib  # noqa: F401: report_plots needs it
     import numpy
 except ImportError as error:
     sys.exit(f'replay_report: {error.name} is missing: install python3-jinja2, python3-matplotlib and python3-numpy.')
 
 HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path.insert(0, HERE)
+from report_page import NONE, embedded, number, percent, png, render_page, table, write_whole  # noqa: E402
 import report_plots  # noqa: E402
 import surfel_pictures  # noqa: E402
-
-# Seen from scripts/ in the source tree, and from lib/frontier_surfels or bin in an installation
-TEMPLATE_FOLDERS = [os.path.join(HERE, folder) for folder in ('../share', '../../share/frontier_surfels', '../share/frontier_surfels')]
-NONE = '–'
 
 # The paper's own figures, as far as they are known here: one core of an i7-7700, and a GTX 1070; 160 x 120 pixels.
 PAPER_FRAME_CPU = '1130–1770'  # [ms]
@@ -35,24 +30,6 @@ PAPER_STAGES = {'sweeps': ('243', '4.9'), 'median': ('224', '2.0')}  # [ms]
 PAPER_BYTES_PER_SURFEL = '38–43'
 PAPER_MAP_MB = '90'
 PAPER_SURFELS = '2.4'  # [million]
-
-
-def percent(share):
-    """A share as a percentage with a sensible number of digits."""
-    if share is None:
-        return NONE
-    value = 100 * share
-    digits = 1 if value >= 10 else 2 if value >= 0.1 or value == 0 else 3
-    return f'{value:.{digits}f} %'
-
-
-def number(value, digits=3):
-    """A number with `digits` significant digits, and thin spaces between thousands."""
-    if value is None:
-        return NONE
-    if isinstance(value, int) or abs(value) >= 10 ** (digits - 1):
-        return f'{value:,.0f}'.replace(',', '\u202f')
-    return f'{value:#.{digits}g}'.rstrip('.')
 
 
 def read_json(path):
@@ -107,12 +84,6 @@ def millimetres(metres):
 def has_gaps(octomap):
     """Whether neighbouring rays may be further apart than OctoMap's voxels."""
     return octomap['resolution'] < 0.999 * octomap['pixel_spacing']
-
-
-def table(head, rows):
-    """A table for the page, without the columns that have no value at all."""
-    kept = [n for n in range(len(head)) if n == 0 or any(row[n] != NONE for row in rows)]
-    return {'head': [head[n] for n in kept], 'rows': [[row[n] for n in kept] for row in rows]}
 
 
 def accuracy_rows(summary):
@@ -202,16 +173,6 @@ def left_table(objects):
     return {'head': ['object', 'occupied, at the end', 'frontier, at the end', 'occupied, most', 'frontier, most'], 'rows': rows}
 
 
-def embedded(mime, data):
-    return f'data:{mime};base64,' + base64.b64encode(data).decode('ascii')
-
-
-def png(picture):
-    file = io.BytesIO()
-    matplotlib.image.imsave(file, picture.clip(0, 1), format='png')
-    return embedded('image/png', file.getvalue())
-
-
 def pictures(folder):
     """(caption, image) of the map from outside and from inside, and the same of OctoMap's boundary."""
     trajectory = numpy.loadtxt(os.path.join(folder, 'trajectory.txt'), ndmin=2)
@@ -249,11 +210,8 @@ def page(folder):
     frames = read_frames(os.path.join(folder, 'frames.csv'))
     surfels, octomap = summary['surfels'], summary.get('octomap')
     bytes_per_surfel = surfels['map_bytes'] / surfels['total'] if surfels['total'] else 0
-    loader = jinja2.FileSystemLoader(TEMPLATE_FOLDERS)
-    environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, autoescape=True, trim_blocks=True,
-                                     lstrip_blocks=True)
-    template = environment.get_template('report.html.j2')
-    return template.render(
+    return render_page(
+        'report.html.j2',
         name=os.path.basename(os.path.normpath(summary['input']['path'])), summary=summary, headlines=headlines(summary),
         accuracy=table(['', 'here'], accuracy_rows(summary)),
         times=table(['', 'here', 'OctoMap', 'paper, CPU', 'paper, GPU'], time_rows(summary)),
@@ -266,27 +224,13 @@ def page(folder):
         map_plot=embedded('image/svg+xml', report_plots.map_per_frame(frames, bytes_per_surfel)))
 
 
-def write_page(path, html):
-    """Writes the page beside an earlier one and replaces that only when the new one is complete."""
-    unfinished = path + '.unfinished'
-    try:
-        with open(unfinished, 'w', encoding='utf-8') as file:
-            file.write(html)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(unfinished, path)
-    finally:
-        if os.path.exists(unfinished):
-            os.remove(unfinished)
-
-
 def main():
     if len(sys.argv) != 2 or not sys.argv[1] or sys.argv[1].startswith('-'):
         print('usage: replay_report.py DIR\n' + __doc__, file=sys.stderr)
         return 2
     folder = sys.argv[1]
     try:
-        write_page(os.path.join(folder, 'report.html'), page(folder))
+        write_whole(os.path.join(folder, 'report.html'), page(folder))
     except (OSError, ValueError, KeyError, jinja2.TemplateError) as error:
         print(f"replay_report: the report of '{folder}' could not be made: {type(error).__name__}: {error}", file=sys.stderr)
         return 1

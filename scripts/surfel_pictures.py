@@ -23,12 +23,13 @@ Splats = collections.namedtuple('Splats', 'position normal radius color two_side
 def read_ply(path):
     """The vertices of a binary little endian PLY file as a structured array."""
     with open(path, 'rb') as file:
-        fields, count = [], 0
+        fields, count, element = [], 0, ''
         for line in iter(file.readline, b''):
             words = line.decode('ascii', 'replace').split()
-            if words[:2] == ['element', 'vertex']:
-                count = int(words[2])
-            elif words[:1] == ['property']:
+            if words[:1] == ['element']:
+                element = words[1]
+                count = int(words[2]) if element == 'vertex' else count
+            elif words[:1] == ['property'] and element == 'vertex':  # what follows the vertices may be what has been seen
                 fields.append((words[2], TYPES[words[1]]))
             elif words == ['end_header']:
                 break
