@@ -18,9 +18,8 @@ class Explore(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp()
-        # It has a master of its own, so that it is what a user runs.
         cls.result = subprocess.run(
-            ['roslaunch', '-p', '0', 'frontier_surfels', 'explore.launch', 'strategies:=' + ' '.join(STRATEGIES), f'most_views:={VIEWS}',
+            ['roslaunch', 'frontier_surfels', 'explore.launch', 'strategies:=' + ' '.join(STRATEGIES), f'most_views:={VIEWS}',
              'report:=' + os.path.join(cls.folder, 'report')], capture_output=True, text=True, timeout=400)
         cls.output = cls.result.stdout + cls.result.stderr
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <iomanip>
+#include <regex>
 #include <sstream>
 
 #include "frontier_surfels/paths.hpp"
@@ -17,6 +18,9 @@ ExplorationLog::ExplorationLog(const std::string& folder) {
   folder_ = absolute_path(folder);
   std::error_code fault;
   std::filesystem::create_directories(folder_, fault);
+  const std::regex picture("(frontiers|nearest|random)_[0-9]{4,}\\.ply");  // of an earlier exploration: the page would show them
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, fault))
+    if (std::regex_match(entry.path().filename().string(), picture)) std::filesystem::remove(entry.path(), fault);
   table_.open(folder_ + "/exploration.csv");
   table_ << "strategy,views,metres,seconds,share,decision_ms,x,y,z" << std::endl;
   if (!table_) throw FileError("Cannot write '" + folder_ + "/exploration.csv': does the folder exist, and may it be written?");

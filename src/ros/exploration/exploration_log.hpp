@@ -12,7 +12,8 @@ namespace frontier_surfels {
 
 class ExplorationLog {
  public:
-  /// @param folder  gets exploration.csv, a line for each view; is made if it is missing; empty: nothing is written
+  /// @param folder  gets exploration.csv, a line for each view; is made if it is missing, and loses the pictures of an earlier
+  ///                exploration; empty: nothing is written
   /// @throws FileError  it cannot be written
   explicit ExplorationLog(const std::string& folder);
 

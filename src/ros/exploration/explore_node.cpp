@@ -186,8 +186,11 @@ class Explorer {
     wait_for_map(report_.header.stamp);
     start_ = here();
     ways_.been = {start_};
-    for (int n = 1; n < 8; ++n)
-      move({}, Isometry(Eigen::Translation3f(start_) * Eigen::AngleAxisf(M_PI / 4, Vector3f::UnitZ()) * T_world_camera_.linear()));
+    for (int n = 1; n < 8; ++n) {
+      Isometry turned = T_world_camera_;
+      turned.linear() = Eigen::AngleAxisf(M_PI / 4, Vector3f::UnitZ()) * T_world_camera_.linear();
+      move({}, turned);
+    }
   }
 
   /// Poses that are the same to a decimetre count as one.
@@ -207,8 +210,9 @@ class Explorer {
     std::stable_sort(all.begin(), all.end(), better);
     if (all.size() > kEvaluated) all.resize(kEvaluated);
     if (!nearest) evaluate(all);
+    all.erase(std::remove_if(all.begin(), all.end(), [&](const Candidate& c) { return c.value < least_value_; }), all.end());
     const auto best = std::min_element(all.begin(), all.end(), better);
-    return best == all.end() || best->value < least_value_ ? std::nullopt : std::make_optional(*best);
+    return best == all.end() ? std::nullopt : std::make_optional(*best);
   }
 
   std::vector<Candidate> reachable_viewpoints(const Ways& ways) const {
