@@ -76,7 +76,7 @@ TEST(MapperViews, SeeWhatTheSlowAnswerSees) {
   const Mapper mapper = room_mapper();
   const std::vector<Surfel> surfels = mapper.surfels();
   for (const auto& camera :
-       {Intrinsics{400, 380, 20.3, 8.6, 37, 23}, Intrinsics{900, 900, 0, 0, 1, 1}, Intrinsics{300, 310, 15, -4, 33, 5}}) {
+       {Intrinsics{400, 380, 20.3, 8.6, 37, 23}, Intrinsics{900, 900, 0, 0, 1, 1}, Intrinsics{400, 410, 15, -4, 33, 5}}) {
     ViewQuestion question = random_question(6, 1, camera);
     for (const bool with_box : {false, true}) {
       if (with_box) question.box_world = Eigen::AlignedBox3f(Eigen::Vector3f(-1, -3, 0.2F), Eigen::Vector3f(2.5F, 0.4F, 3));

@@ -11,6 +11,7 @@
 
 #define NEAR_BITS 0x3c000000u  // of VIEW_NEAR
 #define DEPTH_SHIFT 9          // bits of a float's that are left out
+#define VIEW_ROUNDING 1e-4f    // [m] more than rounding moves a point
 #define SMALL_DISC 2           // pixels along an edge
 #define SLOPE_BITS 12
 #define FRONTIER_PIXEL (1u << SLOPE_BITS)
@@ -124,10 +125,21 @@ INLINE void draw_small_discs(const AskedCamera* camera, const ViewDiscs* d, uint
   }
 }
 
+// Bits of the lanes whose balls may be in the image and within the range. Discs near the camera's plane cannot be told by their pixels.
+INLINE uint balls_in_image(const AskedCamera* camera, Points p, floatv radius) {
+  const floatv x_reach = radius * camera->side_x + VIEW_ROUNDING, y_reach = radius * camera->side_y + VIEW_ROUNDING;
+  return lane_bits(MARK((p.z + radius >= VIEW_NEAR) & (p.z - radius <= camera->range) & (p.x - camera->right * p.z <= x_reach) &
+                        (camera->left * p.z - p.x <= x_reach) & (p.y - camera->bottom * p.z <= y_reach) &
+                        (camera->top * p.z - p.y <= y_reach)));
+}
+
 // Draws LANES surfels, those whose bits are set.
 INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_local, Surfels s, uint lanes, __global uint* image,
                          bool shared) {
-  const Points p = transformed(T_camera_local, s.position), n = rotated(T_camera_local, unpack_normals(s.normal));
+  const Points p = transformed(T_camera_local, s.position);
+  lanes &= balls_in_image(camera, p, s.radius);
+  if (lanes == 0) return;
+  const Points n = rotated(T_camera_local, unpack_normals(s.normal));
   const floatv reach_z = s.radius * sqrt(fmax(1.0f - n.z * n.z, 0.0f)), near_z = p.z - reach_z;
   const intv whole = MARK(near_z >= VIEW_NEAR), has_middle = MARK(p.z >= VIEW_NEAR);
   lanes &= lane_bits(MARK((p.z + reach_z >= VIEW_NEAR) & (near_z <= camera->range)));
@@ -185,13 +197,14 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
 }
 
 // `per_view` work items share an image: each draws the surfels of some of the blocks that the view may see.
-//   in  views[count];  blocks: for each view, nearest first: number of the block * 2, + 1 if its merged surfels are drawn;
-//       pages, page_begin, merged, merged_count: see merged_surfels.cl
+//   in  views[count];  drawn: for each view, nearest first: number of the block * (MERGE_LEVELS + 1), + the level of its merged surfels if
+//       those are drawn;  pages, page_begin[blocks + 1], merged, merged_count: see merged_surfels.cl
 //   i/o images: VIEW_NOTHING before
 __kernel void draw_views(const AskedCamera camera, const float block_size, __global const AskedView* views, const int count,
-                         const int per_view, __global const uint* blocks, __global const uint4* surfels, __global const ulong* alive,
-                         __global const int4* page_block, __global const uint* pages, __global const uint* page_begin,
-                         __global const uint4* merged, __global const uint* merged_count, __global uint* images) {
+                         const int per_view, __global const uint* drawn, const uint blocks, __global const uint4* surfels,
+                         __global const ulong* alive, __global const int4* page_block, __global const uint* pages,
+                         __global const uint* page_begin, __global const uint4* merged, __global const uint* merged_count,
+                         __global uint* images) {
   const int n = get_global_id(0) / per_view;
   if (n >= count) return;
   const AskedView view = views[n];
@@ -199,12 +212,14 @@ __kernel void draw_views(const AskedCamera camera, const float block_size, __glo
   __global uint* image = images + (ulong)n * camera.image;
   const bool shared = per_view > 1;
   for (int at = view.first_block + get_global_id(0) % per_view; at < view.end_block; at += per_view) {
-    const uint block = blocks[at] / 2, begin = page_begin[block], end = page_begin[block + 1];
+    const uint block = drawn[at] / (MERGE_LEVELS + 1), level = drawn[at] % (MERGE_LEVELS + 1), begin = page_begin[block],
+               end = page_begin[block + 1];
     const int4 corner = page_block[pages[begin]];
-    if (blocks[at] % 2 != 0) {
-      const uint left = merged_count[block];
+    if (level != 0) {
+      const uint left = merged_count[merged_counter(level, block, blocks)];
+      __global const uint4* own = merged + merged_begin(level, block, page_begin, blocks);
       for (uint m = 0; m < left; m += LANES) {
-        const Surfels s = load_surfels(&window, merged, corner, PAGE_SLOTS * begin + m);
+        const Surfels s = load_surfels(&window, own, corner, m);
         draw_surfels(&camera, &view.T_camera_local, s, lane_bits(MARK((int)m + lane_numbers() < (int)left)), image, shared);
       }
       continue;
