@@ -127,7 +127,7 @@ INLINE void draw_small_discs(const AskedCamera* camera, const ViewDiscs* d, uint
 
 // Bits of the lanes whose balls may be in the image and within the range. Discs near the camera's plane cannot be told by their pixels.
 INLINE uint balls_in_image(const AskedCamera* camera, Points p, floatv radius) {
-  const floatv x_reach = radius * camera->side_x + VIEW_ROUNDING, y_reach = radius * camera->side_y + VIEW_ROUNDING;
+  const floatv x_reach = (radius + VIEW_ROUNDING) * camera->side_x, y_reach = (radius + VIEW_ROUNDING) * camera->side_y;
   return lane_bits(MARK((p.z + radius >= VIEW_NEAR) & (p.z - radius <= camera->range) & (p.x - camera->right * p.z <= x_reach) &
                         (camera->left * p.z - p.x <= x_reach) & (p.y - camera->bottom * p.z <= y_reach) &
                         (camera->top * p.z - p.y <= y_reach)));
