@@ -159,6 +159,10 @@ namespace frontier_surfels {
 #define VIEW_NEAR 0.0078125f
 #define VIEW_NOTHING 0xffffffffu
 
+// Edge of the tiles of its image that hide what is behind them [pixel], and spare tiles behind the end of a row.
+#define HIDING_TILE 4
+#define HIDING_SPARE 5
+
 // Areas are summed in steps of 1 / VIEW_AREA_ONE, which makes them the same in any order; a surface that is seen at a smaller slope than
 // VIEW_LEAST_SLOPE counts as if it had this one.
 #define VIEW_AREA_ONE 16777216.0f

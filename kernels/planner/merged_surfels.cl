@@ -1,9 +1,10 @@
 // Surfels merged by cells of their block, for views that see them from afar - ours.
 //
 // The surfels of a cell become one if they have the same label and their normals the same largest coordinate, in absolute value, with the
-// same sign: thin sheets keep both of their sides. Larger surfels than half a cell stay as they are. A merged surfel has the mean position
-// and normal, and a radius with which a disc covers what its surfels cover. All is summed in whole numbers, so that the order of the
-// surfels does not matter.
+// same sign: thin sheets keep both of their sides. Surfels with a larger radius than a cell's edge stay as they are. A merged surfel has
+// the mean position and normal, and a radius that reaches beyond the outermost centres of its surfels by half the largest radius among
+// them: surfels overlap, and with the whole radius what is merged would be too large in views. All is summed in whole numbers, so that the
+// order of the surfels does not matter.
 //   merged[MERGE_LEVELS][slots of all pages]: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n] of their level
 //   merged_count[MERGE_LEVELS][blocks]: how many there are
 
@@ -16,6 +17,12 @@ INLINE uint merged_counter(uint level, uint block, uint blocks) { return (level 
 #define MERGE_MOST 32767
 
 #define MERGE_NORMAL_ONE 1023.0f
+
+// How far merged discs of a level may reach out of their block [m]: half the radius is at most half a cell's edge, and the spread 3/2 of
+// it.
+INLINE float merged_reach(uint level, float block_size) {
+  return level == 0 ? 0.0f : 2.01f * block_size / (float)(MERGE_CELLS >> (level - 1));
+}
 
 // The sums of a cell's surfels of one kind.
 typedef struct {
@@ -40,10 +47,10 @@ INLINE uint merge_cell(const MergeCells* cells, uint x, uint y, uint z) {
   return ((z >> cells->shift << bits | y >> cells->shift) << bits) | x >> cells->shift;
 }
 
-// Half a cell as a radius of the map: no larger surfel is merged.
+// A cell's edge as a radius of the map: no larger surfel is merged.
 INLINE uint merge_most_radius(float block_size, uint cells) {
   uint halves[LANES];
-  vstorev(floats_to_halves((floatv)(0.5f * block_size / (float)cells)), 0, halves);
+  vstorev(floats_to_halves((floatv)(block_size / (float)cells)), 0, halves);
   return halves[0];
 }
 
@@ -125,8 +132,8 @@ INLINE void merge_lanes(MergeCells* cells, Quads packed, uint lanes) {
   }
 }
 
-// Square of a merged disc's radius without that of its surfels, in steps of positions. The mean square of the distance from the middle is a
-// third of it at the ends of a line and at the corners of a square.
+// Square of the distance from the middle to the outermost centres, in steps of positions. The mean square of the distance from the middle
+// is a third of it at the ends of a line and at the corners of a square.
 INLINE float merge_spread(const MergeSum* s) {
   const ulong all = s->squares * s->count, mean = (ulong)s->x * s->x + (ulong)s->y * s->y + (ulong)s->z * s->z;
   return 3.0f * (float)(all - mean) / ((float)s->count * (float)s->count);
@@ -148,7 +155,8 @@ INLINE void write_merged(const MergeCells* cells, float block_size, __global uin
       n_y[m] = (float)s.n_y;
       n_z[m] = (float)s.n_z;
     }
-    const floatv reach = halves_to_floats(vloadv(0, radius)) + sqrt(vloadv(0, spread)) * (block_size / 65536.0f);
+    const floatv own = halves_to_floats(vloadv(0, radius)),
+                 reach = fmax(own, 0.5f * own + sqrt(vloadv(0, spread)) * (block_size / 65536.0f));
     const Points normal = {vloadv(0, n_x), vloadv(0, n_y), vloadv(0, n_z)};
     const Quads packed = {vloadv(0, xy), vloadv(0, zs) | floats_to_halves(reach) << 16, pack_normals(normal), vloadv(0, kind)};
     scatter_quads(packed, (intv)((int)chunk) + lane_numbers(), MARK((int)chunk + lane_numbers() < (int)cells->count), merged);

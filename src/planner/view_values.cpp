@@ -192,7 +192,14 @@ struct ViewValues::Plan {
 };
 
 ViewValues::ViewValues(Commands& commands)
-    : commands_(commands), merged_(commands), views_(commands), blocks_(commands), images_(commands), areas_(commands), counts_(commands) {}
+    : commands_(commands),
+      merged_(commands),
+      views_(commands),
+      blocks_(commands),
+      images_(commands),
+      tiles_(commands),
+      areas_(commands),
+      counts_(commands) {}
 
 std::vector<ViewValue> ViewValues::find(const ViewQuestion& question, const SurfelMap& map) {
   std::vector<ViewValue> values(question.T_world_camera.size());
@@ -220,12 +227,17 @@ void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std:
   views_.send(std::move(plan.views));
   images_.resize(count * camera.image);
   images_.fill(kStage, VIEW_NOTHING, count * camera.image);
+  const std::size_t image_tiles =
+      std::size_t{1} * (camera.width / HIDING_TILE + HIDING_SPARE) * ((camera.height + HIDING_TILE - 1) / HIDING_TILE);
+  const std::size_t per_view = items_per_view(count);
+  tiles_.resize(per_view > 1 ? 1 : count * image_tiles);
+  if (per_view == 1) tiles_.fill(kStage, VIEW_NOTHING, count * image_tiles);
   if (!plan.blocks.empty()) {
     blocks_.send(std::move(plan.blocks));
-    const std::size_t per_view = items_per_view(count);
     commands_.run(kStage, "draw_views", count * per_view, commands_.device().heavy_group(), camera, static_cast<cl_float>(map.block_size()),
-                  views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view), blocks_(), blocks, map.surfels(), map.alive(),
-                  map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(), merged_.counts(), images_());
+                  static_cast<cl_float>(map.largest_radius()), views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view),
+                  blocks_(), blocks, map.surfels(), map.alive(), map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(),
+                  merged_.counts(), images_(), static_cast<cl_uint>(image_tiles), tiles_());
   }
   areas_.resize(2 * rows);
   counts_.resize(VIEW_COUNTS * rows);
