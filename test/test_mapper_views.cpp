@@ -195,8 +195,11 @@ TEST(MapperViews, AgreeWithTheRoom) {
         ++true_pixels;
       }
   }
-  // Reached when this was written: 0.940 of the pixels and 0.887 of the area, and 0.029 frontier. What is missing has not been explained
-  // yet.
+  // Reached when this was written: 0.941 of the pixels and 0.888 of the area, and 0.029 frontier. Each ray against each disc and the true
+  // room say where the rest is, in shares of the pixels: 0.026 go through between discs, and end nowhere or on what is behind (discs
+  // of 1.15 times the radius would close half of these gaps); 0.013 see surfels on the surface that have never been labelled as occupied,
+  // mostly at edges; 0.012 see frontier before a surface that the frame did not see; 0.008 see backs at edges. Where a pixel sees the right
+  // surface, its area is another 7 % too small: surfels of oblique surfaces face the camera more than the surface does.
   EXPECT_NEAR(pixels, true_pixels, 0.08 * true_pixels);
   EXPECT_NEAR(area, truth, 0.15 * truth);
   EXPECT_LT(frontier, 0.04 * true_pixels);
