@@ -45,6 +45,24 @@ TEST(MapperBoundaries, NearestAreThoseOfAllSurfels) {
   }
 }
 
+/// A few points are answered in another way than many, with the same answers.
+TEST(MapperBoundaries, FewPointsGetTheAnswersOfMany) {
+  const Points points = random_points(3000, 14, box_around(room_mapper().surfels()));
+  for (const double reach : {0.05, 0.7, 5.0}) {
+    const std::vector<NearestBoundary> of_many = room_mapper().nearest_boundaries(points, reach);
+    for (std::size_t n = 0; n + 2 < 120; n += 3) {
+      const std::vector<NearestBoundary> of_few = room_mapper().nearest_boundaries({points[n], points[n + 1], points[n + 2]}, reach);
+      for (std::size_t m = 0; m < 3; ++m) {
+        EXPECT_EQ(of_few[m].id, of_many[n + m].id);
+        EXPECT_EQ(of_few[m].in_front, of_many[n + m].in_front);
+        EXPECT_EQ(of_few[m].label, of_many[n + m].label);
+        if (of_few[m].id == NearestBoundary::kNone) continue;
+        EXPECT_NEAR(of_few[m].distance, of_many[n + m].distance, 1e-6F);
+      }
+    }
+  }
+}
+
 /// Points of free space are in front of their nearest surfel. At the rims of sheets of frontier, some are behind one that looks past them.
 TEST(MapperBoundaries, FreeSpaceIsInFront) {
   const Points points = random_points(5000, 12, box_around(room_mapper().surfels()));

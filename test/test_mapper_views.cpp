@@ -76,7 +76,7 @@ TEST(MapperViews, SeeWhatTheSlowAnswerSees) {
   const Mapper mapper = room_mapper();
   const std::vector<Surfel> surfels = mapper.surfels();
   for (const auto& camera :
-       {Intrinsics{400, 380, 20.3, 8.6, 37, 23}, Intrinsics{900, 900, 0, 0, 1, 1}, Intrinsics{300, 310, 15, -4, 33, 5}}) {
+       {Intrinsics{400, 380, 20.3, 8.6, 37, 23}, Intrinsics{900, 900, 0, 0, 1, 1}, Intrinsics{400, 410, 15, -4, 33, 5}}) {
     ViewQuestion question = random_question(6, 1, camera);
     for (const bool with_box : {false, true}) {
       if (with_box) question.box_world = Eigen::AlignedBox3f(Eigen::Vector3f(-1, -3, 0.2F), Eigen::Vector3f(2.5F, 0.4F, 3));
@@ -105,6 +105,15 @@ TEST(MapperViews, MergedSurfelsChangeLittle) {
   for (std::size_t n = 0; n < values.size(); ++n) expect_near(values[n], slow_value(mapper.surfels(), question, n), 0.05, 0.03 * 40 * 30);
 }
 
+void expect_same(const ViewValue& a, const ViewValue& b) {
+  EXPECT_EQ(a.frontier_area, b.frontier_area);
+  EXPECT_EQ(a.occupied_area, b.occupied_area);
+  EXPECT_EQ(a.frontier_pixels, b.frontier_pixels);
+  EXPECT_EQ(a.occupied_pixels, b.occupied_pixels);
+  EXPECT_EQ(a.beyond_range_pixels, b.beyond_range_pixels);
+  EXPECT_EQ(a.state, b.state);
+}
+
 TEST(MapperViews, DoNotDependOnWidthThreadsAndOtherViews) {
   std::vector<std::vector<ViewValue>> all;
   const ViewQuestion question = random_question(9, 3, plain_camera(61, 47, 60));
@@ -118,19 +127,35 @@ TEST(MapperViews, DoNotDependOnWidthThreadsAndOtherViews) {
     one.T_world_camera = {question.T_world_camera[4]};
     all.push_back(std::vector<ViewValue>(9, mapper.evaluate_views(one).front()));
   }
-  const auto expect_same = [](const ViewValue& a, const ViewValue& b) {
-    EXPECT_EQ(a.frontier_area, b.frontier_area);
-    EXPECT_EQ(a.occupied_area, b.occupied_area);
-    EXPECT_EQ(a.frontier_pixels, b.frontier_pixels);
-    EXPECT_EQ(a.occupied_pixels, b.occupied_pixels);
-    EXPECT_EQ(a.beyond_range_pixels, b.beyond_range_pixels);
-    EXPECT_EQ(a.state, b.state);
-  };
   for (std::size_t n = 0; n < 9; ++n) {
     expect_same(all[0][n], all[2][n]);
     expect_same(all[0][n], all[4][n]);
   }
   for (const std::size_t alone : {1, 3, 5}) expect_same(all[alone][4], all[0][4]);
+}
+
+/// A screen stands between the camera and the room. Of many views, hidden blocks are left out; of few, everything is drawn.
+TEST(MapperViews, WhatIsHiddenChangesNothing) {
+  for (const int lanes : {16, 1}) {
+    Config config = as_recorded();
+    config.lanes = lanes;
+    Mapper mapper(config);
+    Frames frames = orbit_frames(coarse_camera(), 6, 17);
+    frames.push_back(plane_frame(coarse_camera(), 0.9));
+    integrate_all(mapper, frames);
+    for (const Intrinsics& camera : {plain_camera(61, 47, 60), plain_camera(160, 120, 131)}) {
+      ViewQuestion question = random_question(70, 6, camera);
+      question.T_world_camera.resize(68);
+      question.T_world_camera.push_back(Eigen::Isometry3d::Identity());
+      question.T_world_camera.push_back(Eigen::Isometry3d(Eigen::Translation3d(0.1, 0, 0.3)));
+      const std::vector<ViewValue> values = mapper.evaluate_views(question);
+      for (std::size_t n = 0; n < values.size(); ++n) {
+        ViewQuestion one = question;
+        one.T_world_camera = {question.T_world_camera[n]};
+        expect_same(values[n], mapper.evaluate_views(one).front());
+      }
+    }
+  }
 }
 
 /// A mapped pose sees what the room shows there, and hardly any frontier; one that looks where nothing was seen sees frontier.
@@ -170,8 +195,11 @@ TEST(MapperViews, AgreeWithTheRoom) {
         ++true_pixels;
       }
   }
-  // Reached when this was written: 0.940 of the pixels and 0.887 of the area, and 0.029 frontier. What is missing has not been explained
-  // yet.
+  // Reached when this was written: 0.941 of the pixels and 0.888 of the area, and 0.029 frontier. Each ray against each disc and the true
+  // room say where the rest is, in shares of the pixels: 0.026 go through between discs, and end nowhere or on what is behind (discs
+  // of 1.15 times the radius would close half of these gaps); 0.013 see surfels on the surface that have never been labelled as occupied,
+  // mostly at edges; 0.012 see frontier before a surface that the frame did not see; 0.008 see backs at edges. Where a pixel sees the right
+  // surface, its area is another 7 % too small: surfels of oblique surfaces face the camera more than the surface does.
   EXPECT_NEAR(pixels, true_pixels, 0.08 * true_pixels);
   EXPECT_NEAR(area, truth, 0.15 * truth);
   EXPECT_LT(frontier, 0.04 * true_pixels);

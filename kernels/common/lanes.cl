@@ -177,6 +177,13 @@ INLINE intv square_rows(void) { return lane_numbers() >> 2; }
 INLINE uintv load_square(__global const uint* from, int row) {
   return (uint16)(vload4(0, from), vload4(0, from + row), vload4(0, from + 2 * row), vload4(0, from + 3 * row));
 }
+// Largest pixels of the next TILES_AT_ONCE tiles of 4 x 4 pixels in a row of tiles.
+#define TILES_AT_ONCE 4
+INLINE void store_tile_maxima(__global const uint* from, int row, __global uint* to) {
+  const uint16 of_columns = max(max(vload16(0, from), vload16(0, from + row)), max(vload16(0, from + 2 * row), vload16(0, from + 3 * row)));
+  const uint8 of_pairs = max(of_columns.even, of_columns.odd);
+  vstore4(max(of_pairs.even, of_pairs.odd), 0, to);
+}
 INLINE void store_square(uintv values, __global uint* to, int row) {
   vstore4(values.lo.lo, 0, to);
   vstore4(values.lo.hi, 0, to + row);
@@ -189,6 +196,12 @@ INLINE intv square_columns(void) { return 0; }
 INLINE intv square_rows(void) { return 0; }
 INLINE uintv load_square(__global const uint* from, int row) { return *from; }
 INLINE void store_square(uintv values, __global uint* to, int row) { *to = values; }
+#define TILES_AT_ONCE 1
+INLINE void store_tile_maxima(__global const uint* from, int row, __global uint* to) {
+  uint largest = 0;
+  for (int n = 0; n < 16; ++n) largest = max(largest, from[n / 4 * row + n % 4]);
+  *to = largest;
+}
 #endif
 
 #if LANES == 16

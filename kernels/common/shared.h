@@ -149,13 +149,19 @@ namespace frontier_surfels {
 #define STATE_CUBE 4
 #define STATE_CHUNK 64
 
-// Values of views, for planners - ours. Far surfels are merged by cells of the map's blocks, MERGE_CELLS along a block's edge.
-#define MERGE_CELLS 16
+// Values of views, for planners - ours. Far surfels are merged by cells of the map's blocks: on level 1 of MERGE_LEVELS by MERGE_CELLS
+// along a block's edge, and on each further level by half as many.
+#define MERGE_LEVELS 3
+#define MERGE_CELLS 32
 #define MERGE_SUM_WORDS 12  // of a cell's sums
 
 // A pixel of such a view: depth | back | frontier | slope, see planner/view_values.cl. Nothing nearer than VIEW_NEAR is seen [m].
 #define VIEW_NEAR 0.0078125f
 #define VIEW_NOTHING 0xffffffffu
+
+// Edge of the tiles of its image that hide what is behind them [pixel], and spare tiles behind the end of a row.
+#define HIDING_TILE 4
+#define HIDING_SPARE 5
 
 // Areas are summed in steps of 1 / VIEW_AREA_ONE, which makes them the same in any order; a surface that is seen at a smaller slope than
 // VIEW_LEAST_SLOPE counts as if it had this one.
@@ -311,6 +317,8 @@ typedef struct {
   float min_range, range;  // [m]
   float slope_step;        // of the slope in a pixel
   float inverse_fx, inverse_fy, inverse_step;
+  float left, right, top, bottom;  // edges of the image, as tangents: half a pixel from the outermost rays
+  float side_x, side_y;            // a point's distance from an edge's plane, times this or less, is x - z * tangent
 } AskedCamera;
 
 // A view that is evaluated. Its local frame is the world's, moved to the lowest corner of block `origin`, in which the camera is.
@@ -322,7 +330,7 @@ typedef struct {
 } AskedView;
 
 #ifndef __OPENCL_VERSION__
-static_assert(sizeof(AskedCamera) == 14 * 4, "AskedCamera must have no padding");
+static_assert(sizeof(AskedCamera) == 20 * 4, "AskedCamera must have no padding");
 static_assert(sizeof(AskedView) == (2 * 12 + 11) * 4, "AskedView must have no padding");
 static_assert(sizeof(Grid) == 19 * 4, "Grid must have no padding");
 static_assert(sizeof(Transform) == 12 * 4, "Transform must have no padding");

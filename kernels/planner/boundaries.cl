@@ -122,6 +122,35 @@ Nearest nearest_surfel(const Cells* cells, __global const float4* entries, __glo
   return nearest;
 }
 
+// Stores on which side of surfels points are, and whether the surfels are occupied, for the first `count` lanes.
+INLINE void store_sides_of_boundaries(Surfels s, Points p, int count, __global uchar* sides) {
+  const Points away = {p.x - s.position.x, p.y - s.position.y, p.z - s.position.z};
+  const uint front = lane_bits(MARK(dot_products(away, unpack_normals(s.normal)) >= 0.0f)),
+             occupied = lane_bits(MARK((s.attributes & SURFEL_OCCUPIED) != 0));
+  for (int m = 0; m < count; ++m) sides[m] = (front >> m & 1 ? BOUNDARY_IN_FRONT : 0) | (occupied >> m & 1 ? BOUNDARY_OCCUPIED : 0);
+}
+
+// Looks at all surfels of a page, LANES at once.
+INLINE void look_through_page(const Window* window, __global const uint4* surfels, __global const ulong* alive,
+                              __global const int4* page_block, uint page, Points p, Nearest* nearest) {
+  const ulong word = alive[page];
+  for (uint first = PAGE_SLOTS * page; first < PAGE_SLOTS * (page + 1); first += LANES) {
+    const Surfels s = load_surfels(window, surfels, page_block[page], first);
+    const Points d = {s.position.x - p.x, s.position.y - p.y, s.position.z - p.z};
+    const floatv squares = d.x * d.x + (d.y * d.y + d.z * d.z);  // as square_distance()
+    uint left = lanes_of_page(word, first) & lane_bits(MARK(squares <= nearest->square));
+    if (left == 0) continue;
+    float square[LANES];
+    vstorev(squares, 0, square);
+    for (; left != 0; left &= left - 1) {
+      const int m = lowest_lane(left);
+      if (square[m] > nearest->square || (square[m] == nearest->square && first + m >= nearest->slot)) continue;
+      nearest->square = square[m];
+      nearest->slot = first + m;
+    }
+  }
+}
+
 // One work item handles LANES points, which should lie near each other: which surfel is the nearest to each, within reach [m]?
 //   in  points[3][stride]: as in states.cl
 //   out distances[count] [m], slots[count]: of the surfels, UINT_MAX for none;  sides[count]: BOUNDARY_IN_FRONT | BOUNDARY_OCCUPIED
@@ -143,12 +172,29 @@ __kernel void find_nearest_boundaries(const Window window, const int cells, cons
     slots[at] = nearest.slot;
     if (nearest.slot != UINT_MAX) found[m] = nearest.slot;
   }
-  const Surfels s = surfels_at(&window, surfels, page_block, vloadv(0, found));
-  const Points p = load_asked_points(points, stride, first);
-  const Points away = {p.x - s.position.x, p.y - s.position.y, p.z - s.position.z};
-  const uint front = lane_bits(MARK(dot_products(away, unpack_normals(s.normal)) >= 0.0f)),
-             occupied = lane_bits(MARK((s.attributes & SURFEL_OCCUPIED) != 0));
-  for (int m = 0; m < own; ++m) sides[first + m] = (front >> m & 1 ? BOUNDARY_IN_FRONT : 0) | (occupied >> m & 1 ? BOUNDARY_OCCUPIED : 0);
+  store_sides_of_boundaries(surfels_at(&window, surfels, page_block, vloadv(0, found)), load_asked_points(points, stride, first), own,
+                            sides + first);
+}
+
+// The same of few points, without a list of surfels by cells: one work item handles a point.
+//   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  near_begin[count + 1], near: for each point the blocks
+//       that may have a surfel within reach, nearest first;  near_squares: squares of at most their distances from the point [m^2]
+__kernel void find_nearest_in_blocks(const Window window, const float reach, __global const uint4* surfels, __global const ulong* alive,
+                                     __global const int4* page_block, __global const uint* pages, __global const uint* page_begin,
+                                     __global const uint* near_begin, __global const uint* near, __global const float* near_squares,
+                                     __global const float* points, const int stride, const int count, __global float* distances,
+                                     __global uint* slots, __global uchar* sides) {
+  const int n = get_global_id(0);
+  if (n >= count) return;
+  const Points p = {points[n], points[stride + n], points[2 * stride + n]};
+  Nearest nearest = {reach * reach, UINT_MAX, (float3)(0.0f)};
+  for (uint at = near_begin[n]; at < near_begin[n + 1] && near_squares[at] <= nearest.square; ++at)
+    for (uint m = page_begin[near[at]]; m < page_begin[near[at] + 1]; ++m)
+      look_through_page(&window, surfels, alive, page_block, pages[m], p, &nearest);
+  distances[n] = sqrt(nearest.square);
+  slots[n] = nearest.slot;
+  const uint found = nearest.slot != UINT_MAX ? nearest.slot : 0;
+  store_sides_of_boundaries(surfels_at(&window, surfels, page_block, (uintv)(found)), p, 1, sides + n);
 }
 
 // When, from 0 to 1, is from + t way within half of [low, high]? @return first and last t; the first is larger: never

@@ -1,15 +1,28 @@
 // Surfels merged by cells of their block, for views that see them from afar - ours.
 //
 // The surfels of a cell become one if they have the same label and their normals the same largest coordinate, in absolute value, with the
-// same sign: thin sheets keep both of their sides. Larger surfels than half a cell stay as they are. A merged surfel has the mean position
-// and normal, and a radius with which a disc covers what its surfels cover. All is summed in whole numbers, so that the order of the
-// surfels does not matter.
-//   merged: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n];  merged_count[blocks]: how many there are
+// same sign: thin sheets keep both of their sides. Surfels with a larger radius than a cell's edge stay as they are. A merged surfel has
+// the mean position and normal, and a radius that reaches beyond the outermost centres of its surfels by half the largest radius among
+// them: surfels overlap, and with the whole radius what is merged would be too large in views. All is summed in whole numbers, so that the
+// order of the surfels does not matter.
+//   merged[MERGE_LEVELS][slots of all pages]: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n] of their level
+//   merged_count[MERGE_LEVELS][blocks]: how many there are
+
+INLINE ulong merged_begin(uint level, uint block, __global const uint* page_begin, uint blocks) {
+  return PAGE_SLOTS * ((ulong)(level - 1) * page_begin[blocks] + page_begin[block]);
+}
+INLINE uint merged_counter(uint level, uint block, uint blocks) { return (level - 1) * blocks + block; }
 
 // No more surfels of a cell are added up: larger sums would not fit.
 #define MERGE_MOST 32767
 
 #define MERGE_NORMAL_ONE 1023.0f
+
+// How far merged discs of a level may reach out of their block [m]: half the radius is at most half a cell's edge, and the spread 3/2 of
+// it.
+INLINE float merged_reach(uint level, float block_size) {
+  return level == 0 ? 0.0f : 2.01f * block_size / (float)(MERGE_CELLS >> (level - 1));
+}
 
 // The sums of a cell's surfels of one kind.
 typedef struct {
@@ -34,25 +47,34 @@ INLINE uint merge_cell(const MergeCells* cells, uint x, uint y, uint z) {
   return ((z >> cells->shift << bits | y >> cells->shift) << bits) | x >> cells->shift;
 }
 
-// Half a cell as a radius of the map: no larger surfel is merged.
-INLINE uint merge_most_radius(float block_size, int cells) {
+// A cell's edge as a radius of the map: no larger surfel is merged.
+INLINE uint merge_most_radius(float block_size, uint cells) {
   uint halves[LANES];
-  vstorev(floats_to_halves((floatv)(0.5f * block_size / (float)cells)), 0, halves);
+  vstorev(floats_to_halves((floatv)(block_size / (float)cells)), 0, halves);
   return halves[0];
 }
 
-// Adds a surfel, as sums of its own.
-INLINE void merge_into_cell(MergeCells* cells, MergeSum s) {
-  uint first = 0, cell = 0;
+// Cells of a level, without any sums.
+INLINE void begin_merge_level(MergeCells* cells, uint level, float block_size) {
+  const uint edge = MERGE_CELLS >> (level - 1);
+  cells->count = 0;
+  cells->shift = 16 - (int)popcount(edge - 1);
+  cells->most_radius = merge_most_radius(block_size, edge);
+}
+
+// Adds a surfel, or the sums of a smaller cell.
+//   x, y, z: its position
+INLINE void merge_into_cell(MergeCells* cells, MergeSum s, uint x, uint y, uint z) {
+  uint first = 0;
   if (s.radius <= cells->most_radius) {
-    cell = merge_cell(cells, s.x, s.y, s.z);
+    const uint cell = merge_cell(cells, x, y, z);
     first = cells->table[cell];
     for (uint n = first; n != 0; n = cells->sums[n - 1].next) {
       __global MergeSum* to = &cells->sums[n - 1];
       if (to->kind != s.kind) continue;
-      if (to->count == MERGE_MOST) return;
+      if (to->count + s.count > MERGE_MOST) return;
       to->squares += s.squares;
-      ++to->count;
+      to->count += s.count;
       to->x += s.x;
       to->y += s.y;
       to->z += s.z;
@@ -77,6 +99,17 @@ INLINE void clear_merge_table(const MergeCells* cells) {
   }
 }
 
+// From the cells of a level to those of the next one. The sums move towards the beginning of their array.
+INLINE void merge_next_level(MergeCells* cells, uint level, float block_size) {
+  const uint count = cells->count;
+  clear_merge_table(cells);
+  begin_merge_level(cells, level, block_size);
+  for (uint n = 0; n < count; ++n) {
+    const MergeSum s = cells->sums[n];
+    merge_into_cell(cells, s, s.x / s.count, s.y / s.count, s.z / s.count);
+  }
+}
+
 // Adds LANES surfels of a page, those whose bits are set.
 INLINE void merge_lanes(MergeCells* cells, Quads packed, uint lanes) {
   const Points n = unpack_normals(packed.z);
@@ -95,12 +128,12 @@ INLINE void merge_lanes(MergeCells* cells, Quads packed, uint lanes) {
     const int m = lowest_lane(left);
     const uint x = xy[m] & 0xffff, y = xy[m] >> 16, z = zr[m] & 0xffff;
     const ulong squares = (ulong)(x * x) + (ulong)(y * y) + (ulong)(z * z);
-    merge_into_cell(cells, (MergeSum){squares, 1, x, y, z, n_x[m], n_y[m], n_z[m], zr[m] >> 16, kind[m], 0});
+    merge_into_cell(cells, (MergeSum){squares, 1, x, y, z, n_x[m], n_y[m], n_z[m], zr[m] >> 16, kind[m], 0}, x, y, z);
   }
 }
 
-// Square of a merged disc's radius without that of its surfels, in steps of positions. The mean square of the distance from the middle is a
-// third of it at the ends of a line and at the corners of a square.
+// Square of the distance from the middle to the outermost centres, in steps of positions. The mean square of the distance from the middle
+// is a third of it at the ends of a line and at the corners of a square.
 INLINE float merge_spread(const MergeSum* s) {
   const ulong all = s->squares * s->count, mean = (ulong)s->x * s->x + (ulong)s->y * s->y + (ulong)s->z * s->z;
   return 3.0f * (float)(all - mean) / ((float)s->count * (float)s->count);
@@ -122,20 +155,24 @@ INLINE void write_merged(const MergeCells* cells, float block_size, __global uin
       n_y[m] = (float)s.n_y;
       n_z[m] = (float)s.n_z;
     }
-    const floatv reach = halves_to_floats(vloadv(0, radius)) + sqrt(vloadv(0, spread)) * (block_size / 65536.0f);
+    const floatv own = halves_to_floats(vloadv(0, radius)),
+                 reach = fmax(own, 0.5f * own + sqrt(vloadv(0, spread)) * (block_size / 65536.0f));
     const Points normal = {vloadv(0, n_x), vloadv(0, n_y), vloadv(0, n_z)};
     const Quads packed = {vloadv(0, xy), vloadv(0, zs) | floats_to_halves(reach) << 16, pack_normals(normal), vloadv(0, kind)};
     scatter_quads(packed, (intv)((int)chunk) + lane_numbers(), MARK((int)chunk + lane_numbers() < (int)cells->count), merged);
   }
 }
 
-// One work item merges the surfels of every `workers`-th of the listed blocks.
-//   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  list[count]: blocks
+// One work item merges the surfels of every `workers`-th of the listed blocks. The first level is always made, and each level of the one
+// before it, so that the surfels of a level do not depend on which others are asked for.
+//   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  list[count]: number of a block << MERGE_LEVELS, and a
+//   bit
+//       for each level that is asked for, bit 0 for level 1
 //   sums[workers][most_sums] and table[workers][cells of a block]: scratch; all of table is 0 before and afterwards
 //   out merged, merged_count
 __kernel void merge_surfels(const float block_size, __global const uint4* surfels, __global const ulong* alive, __global const uint* pages,
-                            __global const uint* page_begin, __global const uint* list, const uint count, const uint workers,
-                            __global uint* sums, const uint most_sums, __global uint* table, __global uint4* merged,
+                            __global const uint* page_begin, const uint blocks, __global const uint* list, const uint count,
+                            const uint workers, __global uint* sums, const uint most_sums, __global uint* table, __global uint4* merged,
                             __global uint* merged_count) {
   const uint worker = get_global_id(0);
   if (worker >= workers) return;
@@ -143,10 +180,8 @@ __kernel void merge_surfels(const float block_size, __global const uint4* surfel
   cells.sums = (__global MergeSum*)sums + (ulong)worker * most_sums;
   cells.table = table + worker * (MERGE_CELLS * MERGE_CELLS * MERGE_CELLS);
   for (uint n = worker; n < count; n += workers) {
-    const uint block = list[n], begin = page_begin[block], end = page_begin[block + 1];
-    cells.count = 0;
-    cells.shift = 16 - (int)popcount(MERGE_CELLS - 1u);
-    cells.most_radius = merge_most_radius(block_size, MERGE_CELLS);
+    const uint block = list[n] >> MERGE_LEVELS, begin = page_begin[block], end = page_begin[block + 1];
+    begin_merge_level(&cells, 1, block_size);
     for (uint page = begin; page < end; ++page) {
       const ulong word = alive[pages[page]];
       const uint first = PAGE_SLOTS * pages[page];
@@ -155,9 +190,12 @@ __kernel void merge_surfels(const float block_size, __global const uint4* surfel
         if (lanes != 0) merge_lanes(&cells, load_quads(surfels + slot), lanes);
       }
     }
-    write_merged(&cells, block_size, merged + PAGE_SLOTS * begin);
-    merged_count[block] = cells.count;
-
+    for (uint level = 1, asked = list[n] % (1u << MERGE_LEVELS); asked != 0; ++level, asked >>= 1) {
+      if (level > 1) merge_next_level(&cells, level, block_size);
+      if ((asked & 1) == 0) continue;
+      write_merged(&cells, block_size, merged + merged_begin(level, block, page_begin, blocks));
+      merged_count[merged_counter(level, block, blocks)] = cells.count;
+    }
     clear_merge_table(&cells);
   }
 }

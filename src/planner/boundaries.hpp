@@ -1,7 +1,8 @@
 /// The boundary of known space, for planners: near points, and in the way of boxes. kernels/planner/boundaries.cl.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <vector>
 
 #include "frontier_surfels/planner/states.hpp"
@@ -35,9 +36,17 @@ class Boundaries {
   std::vector<FirstSurfel> first_within(const std::vector<MovingBox>& boxes, bool frontier_counts, const SurfelMap& map);
 
  private:
+  void look_in_cells(const std::vector<Eigen::Vector3f>& points_world, const std::vector<std::uint32_t>& asked,
+                     const Eigen::AlignedBox3d& box, double reach, const SurfelMap& map);
+  void look_in_blocks(const std::vector<Eigen::Vector3f>& points_world, const std::vector<std::uint32_t>& asked, double reach,
+                      const MapWindow& window, const SurfelMap& map);
+  std::size_t send_points(const std::vector<Eigen::Vector3f>& points_world, const std::vector<std::uint32_t>& asked,
+                          const Eigen::Vector3d& corner);
+
   Commands& commands_;
   SurfelCells cells_;
-  SentArray<float> points_;
+  SentArray<float> points_, near_squares_;
+  SentArray<cl_uint> pages_, page_begin_, near_begin_, near_;
   SentArray<cl_float4> boxes_;
   DeviceArray<float> distances_;
   DeviceArray<cl_uint> slots_;

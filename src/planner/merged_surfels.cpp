@@ -23,29 +23,34 @@ MergedSurfels::MergedSurfels(Commands& commands)
       merged_(commands) {}
 
 void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
-                          const std::vector<cl_uint>& merged) {
-  std::vector<cl_uint> all, begin = {0};
+                          const std::vector<cl_uint>& levels) {
+  std::vector<cl_uint> all, begin = {0}, list;
   for (const BlockIndex::Pages* own : pages) {
     all.insert(all.end(), own->begin(), own->end());
     begin.push_back(static_cast<cl_uint>(all.size()));
   }
   std::size_t most_pages = 1;
-  for (const cl_uint block : merged) most_pages = std::max(most_pages, pages[block]->size());
+  for (std::size_t block = 0; block < pages.size(); ++block) {
+    if (levels[block] == 0) continue;
+    list.push_back(static_cast<cl_uint>(block << MERGE_LEVELS) | levels[block]);
+    most_pages = std::max(most_pages, pages[block]->size());
+  }
   const std::size_t most_sums = PAGE_SLOTS * most_pages, bytes = most_sums * MERGE_SUM_WORDS * sizeof(cl_uint);
   const std::size_t workers = std::clamp(kMostScratchBytes / bytes, std::size_t{1}, kMostWorkers);
 
-  merged_.resize(PAGE_SLOTS * (merged.empty() ? 1 : all.size() + 1));  // whole vectors are read at their ends
-  counts_.resize(pages.size() + 1);
+  merged_.resize(PAGE_SLOTS * (list.empty() ? 1 : MERGE_LEVELS * all.size() + 1));  // whole vectors are read at their ends
+  counts_.resize(MERGE_LEVELS * pages.size() + 1);
   pages_.send(std::move(all));
   page_begin_.send(std::move(begin));
-  if (merged.empty()) return;
+  if (list.empty()) return;
   sums_.resize(workers * most_sums * MERGE_SUM_WORDS);
   table_.resize(workers * kTableCells);
   table_.fill(stage, 0, workers * kTableCells);
-  list_.send(merged);
+  const auto count = static_cast<cl_uint>(list.size());
+  list_.send(std::move(list));
   commands_.run(stage, "merge_surfels", workers, commands_.device().heavy_group(), static_cast<cl_float>(map.block_size()), map.surfels(),
-                map.alive(), pages_(), page_begin_(), list_(), static_cast<cl_uint>(merged.size()), static_cast<cl_uint>(workers), sums_(),
-                static_cast<cl_uint>(most_sums), table_(), merged_(), counts_());
+                map.alive(), pages_(), page_begin_(), static_cast<cl_uint>(pages.size()), list_(), count, static_cast<cl_uint>(workers),
+                sums_(), static_cast<cl_uint>(most_sums), table_(), merged_(), counts_());
 }
 
 }  // namespace frontier_surfels

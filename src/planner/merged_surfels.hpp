@@ -15,9 +15,9 @@ class MergedSurfels {
 
   /// Merges the surfels of blocks of the map.
   /// @param pages   of each block
-  /// @param merged  numbers of the blocks whose merged surfels are needed
+  /// @param levels  of each block: those that are needed, bit 0 for level 1
   void merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
-             const std::vector<cl_uint>& merged);
+             const std::vector<cl_uint>& levels);
 
   /// @name Results, for kernels.
   /// @{

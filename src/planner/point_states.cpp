@@ -1,6 +1,7 @@
 #include "planner/point_states.hpp"
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -11,6 +12,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr const char* kStage = "states";
+constexpr std::size_t kFewPoints = 1000;          // most blocks of their window have none of them
 constexpr int kCubes = STATE_CELLS / STATE_CUBE;  // along a block's edge
 constexpr int kCellsOfCube = STATE_CUBE * STATE_CUBE * STATE_CUBE;
 
@@ -25,6 +27,21 @@ MapWindow window_around(const std::vector<Eigen::Vector3f>& points, const std::v
   Eigen::AlignedBox3f box;
   for (const std::uint32_t n : asked) box.extend(points[n]);
   return {block_at(box.min().cast<double>(), block_size), block_at(box.max().cast<double>(), block_size), block_size};
+}
+
+/// The blocks that a surfel within `reach` of some point may be in, each once.
+std::vector<BlockKey> blocks_around(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, double reach,
+                                    double block_size) {
+  const Eigen::Vector3d around = Eigen::Vector3d::Constant(1.001 * reach + 1e-4);  // more than rounding loses
+  std::set<BlockKey> blocks;
+  for (const std::uint32_t n : asked) {
+    const Eigen::Vector3d p = points[n].cast<double>();
+    const BlockKey low = block_at(p - around, block_size), high = block_at(p + around, block_size);
+    for (int z = low.z; z <= high.z; ++z)
+      for (int y = low.y; y <= high.y; ++y)
+        for (int x = low.x; x <= high.x; ++x) blocks.insert({x, y, z});
+  }
+  return {blocks.begin(), blocks.end()};
 }
 
 }  // namespace
@@ -107,15 +124,18 @@ void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const st
                 world.views.view_lanes(), static_cast<cl_int>(view_count), world.views.depths(), seen.slots(), seen.tables(),
                 seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), points_(), static_cast<cl_int>(stride), chunks_(),
                 static_cast<cl_int>(sorted.chunks.size()), states_());
-  if (with_surfels) mark_occupied(window, sorted, world.map);
+  if (with_surfels) mark_occupied(window, points, asked, sorted, world.map);
   const std::vector<cl_uchar> found = states_.read(asked.size());
   for (std::size_t n = 0; n < asked.size(); ++n) states[sorted.numbers[n]] = static_cast<SpaceState>(found[n]);
 }
 
 /// Surfels of the blocks around the window reach into it as well, by a voxel.
-void PointStates::mark_occupied(const MapWindow& window, const Sorted& sorted, const SurfelMap& map) {
+void PointStates::mark_occupied(const MapWindow& window, const std::vector<Eigen::Vector3f>& points,
+                                const std::vector<std::uint32_t>& asked, const Sorted& sorted, const SurfelMap& map) {
+  const double reach = map.largest_radius() / kNewRadius;
   std::vector<cl_uint> pages;
-  for (const BlockKey& block : window.blocks_near(map.largest_radius() / kNewRadius, std::size_t{1} << 20))
+  for (const BlockKey& block :
+       asked.size() <= kFewPoints ? blocks_around(points, asked, reach, map.block_size()) : window.blocks_near(reach, std::size_t{1} << 20))
     if (const BlockIndex::Pages* own = map.index().find(block)) pages.insert(pages.end(), own->begin(), own->end());
   const auto count = static_cast<cl_int>(pages.size());
   pages_.send(std::move(pages));

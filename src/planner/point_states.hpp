@@ -44,7 +44,8 @@ class PointStates {
   std::vector<SpaceState> find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world, bool with_surfels);
   void find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
                  bool with_surfels, std::vector<SpaceState>& states);
-  void mark_occupied(const MapWindow& window, const Sorted& sorted, const SurfelMap& map);
+  void mark_occupied(const MapWindow& window, const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked,
+                     const Sorted& sorted, const SurfelMap& map);
 
   Commands& commands_;
   SentArray<float> points_;

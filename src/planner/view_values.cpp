@@ -61,10 +61,17 @@ AskedCamera asked_camera(const ViewQuestion& question) {
   camera.image = camera.row * (c.height + kSpare);
   camera.min_range = static_cast<float>(question.min_range);
   camera.range = static_cast<float>(question.range);
-  camera.slope_step = static_cast<float>(Pyramid(c).longest_ray() / 4095);
+  const Pyramid pyramid(c);
+  camera.slope_step = static_cast<float>(pyramid.longest_ray() / 4095);
   camera.inverse_fx = 1 / camera.fx;
   camera.inverse_fy = 1 / camera.fy;
   camera.inverse_step = 1 / camera.slope_step;
+  camera.left = static_cast<float>(pyramid.left);
+  camera.right = static_cast<float>(pyramid.right);
+  camera.top = static_cast<float>(pyramid.top);
+  camera.bottom = static_cast<float>(pyramid.bottom);
+  camera.side_x = static_cast<float>(std::hypot(1, std::max(std::abs(pyramid.left), std::abs(pyramid.right))));
+  camera.side_y = static_cast<float>(std::hypot(1, std::max(std::abs(pyramid.top), std::abs(pyramid.bottom))));
   return camera;
 }
 
@@ -123,7 +130,7 @@ struct ViewValues::Plan {
   std::vector<AskedView> views;
   std::vector<cl_uint> blocks;                  ///< see draw_views
   std::vector<const BlockIndex::Pages*> pages;  ///< of each block that some view may see
-  std::vector<cl_uint> merged;                  ///< those of these blocks that some view wants merged
+  std::vector<cl_uint> levels;  ///< of each of these blocks: levels of merged surfels that some view draws, bit 0 for level 1
 
   Plan(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map)
       : question_(question),
@@ -131,7 +138,7 @@ struct ViewValues::Plan {
         size_(map.block_size()),
         radius_(std::sqrt(0.75) * size_ + map.largest_radius()),
         focal_(std::max(question.intrinsics.fx, question.intrinsics.fy)) {
-    for (const auto& [key, pages_of_block] : map.index().blocks()) all_.push_back({size_ * center_of(key), &pages_of_block, -1, false});
+    for (const auto& [key, pages_of_block] : map.index().blocks()) all_.push_back({size_ * center_of(key), &pages_of_block, -1});
     for (std::size_t n = begin; n < end; ++n) add_view(n);
   }
 
@@ -140,7 +147,6 @@ struct ViewValues::Plan {
     Eigen::Vector3d center;  ///< world frame [m]
     const BlockIndex::Pages* pages;
     int number;  ///< in Plan::pages, or -1
-    bool merged;
   };
 
   static Eigen::Vector3d center_of(const BlockKey& key) { return {key.x + 0.5, key.y + 0.5, key.z + 0.5}; }
@@ -155,26 +161,29 @@ struct ViewValues::Plan {
         seen.emplace_back(static_cast<float>(p.z()), m);
     }
     std::sort(seen.begin(), seen.end());
+    const double half_depth = 0.5 * size_ * T_camera_world.linear().row(2).cwiseAbs().sum();
     view.first_block = static_cast<cl_int>(blocks.size());
     for (const auto& [depth, m] : seen) {
       Block& block = all_[m];
       if (block.number < 0) {
         block.number = static_cast<int>(pages.size());
         pages.push_back(block.pages);
+        levels.push_back(0);
       }
-      const bool far = small_cells(depth);
-      if (far && !block.merged) {
-        block.merged = true;
-        merged.push_back(static_cast<cl_uint>(block.number));
-      }
-      blocks.push_back(static_cast<cl_uint>(2 * block.number + (far ? 1 : 0)));
+      const int level = merge_level(depth - half_depth);
+      if (level > 0) levels[block.number] |= 1U << (level - 1);
+      blocks.push_back(static_cast<cl_uint>((MERGE_LEVELS + 1) * block.number + level));
     }
     view.end_block = static_cast<cl_int>(blocks.size());
     views.push_back(view);
   }
 
-  /// Are cells at most kCellPixels large wherever in the block they are?
-  bool small_cells(double depth) const { return size_ / MERGE_CELLS * focal_ <= kCellPixels * (depth - std::sqrt(0.75) * size_); }
+  /// The last level whose cells are at most kCellPixels large at this depth, or 0.
+  int merge_level(double depth) const {
+    int level = 0;
+    for (double cell = size_ / MERGE_CELLS; level < MERGE_LEVELS && cell * focal_ <= kCellPixels * depth; cell *= 2) ++level;
+    return level;
+  }
 
   const ViewQuestion& question_;
   const Pyramid pyramid_;
@@ -183,7 +192,14 @@ struct ViewValues::Plan {
 };
 
 ViewValues::ViewValues(Commands& commands)
-    : commands_(commands), merged_(commands), views_(commands), blocks_(commands), images_(commands), areas_(commands), counts_(commands) {}
+    : commands_(commands),
+      merged_(commands),
+      views_(commands),
+      blocks_(commands),
+      images_(commands),
+      tiles_(commands),
+      areas_(commands),
+      counts_(commands) {}
 
 std::vector<ViewValue> ViewValues::find(const ViewQuestion& question, const SurfelMap& map) {
   std::vector<ViewValue> values(question.T_world_camera.size());
@@ -204,18 +220,24 @@ std::size_t ViewValues::items_per_view(std::size_t views) const {
 void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map,
                            std::vector<ViewValue>& values) {
   Plan plan(question, begin, end, map);
+  const auto blocks = static_cast<cl_uint>(plan.pages.size());
   const AskedCamera camera = asked_camera(question);
   const std::size_t count = end - begin, rows = count * camera.height;
-  merged_.merge(kStage, map, plan.pages, plan.merged);
+  merged_.merge(kStage, map, plan.pages, plan.levels);
   views_.send(std::move(plan.views));
   images_.resize(count * camera.image);
   images_.fill(kStage, VIEW_NOTHING, count * camera.image);
+  const std::size_t image_tiles =
+      std::size_t{1} * (camera.width / HIDING_TILE + HIDING_SPARE) * ((camera.height + HIDING_TILE - 1) / HIDING_TILE);
+  const std::size_t per_view = items_per_view(count);
+  tiles_.resize(per_view > 1 ? 1 : count * image_tiles);
+  if (per_view == 1) tiles_.fill(kStage, VIEW_NOTHING, count * image_tiles);
   if (!plan.blocks.empty()) {
     blocks_.send(std::move(plan.blocks));
-    const std::size_t per_view = items_per_view(count);
     commands_.run(kStage, "draw_views", count * per_view, commands_.device().heavy_group(), camera, static_cast<cl_float>(map.block_size()),
-                  views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view), blocks_(), map.surfels(), map.alive(),
-                  map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(), merged_.counts(), images_());
+                  static_cast<cl_float>(map.largest_radius()), views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view),
+                  blocks_(), blocks, map.surfels(), map.alive(), map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(),
+                  merged_.counts(), images_(), static_cast<cl_uint>(image_tiles), tiles_());
   }
   areas_.resize(2 * rows);
   counts_.resize(VIEW_COUNTS * rows);

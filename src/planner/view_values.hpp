@@ -31,7 +31,7 @@ class ViewValues {
   MergedSurfels merged_;
   SentArray<AskedView> views_;
   SentArray<cl_uint> blocks_;
-  DeviceArray<cl_uint> images_;
+  DeviceArray<cl_uint> images_, tiles_;
   DeviceArray<cl_ulong> areas_;
   DeviceArray<cl_uint> counts_;
 };
