@@ -78,42 +78,63 @@ __kernel void find_free_cells(const Frame f, __global const View* views, __globa
   *word = known | ~(left | forbidden);
 }
 
+// Index of the word of a cell's row in the marks.
+//   cells: of the region along each axis, x a multiple of 32;  kind: 0 frontier, 1 occupied
+INLINE intv mark_word(int4 cells, intv kind, intv x, intv y, intv z) {
+  return ((kind * cells.z + z) * cells.y + y) * (cells.x / 32) + (x >> 5);
+}
+
 // One work item handles LANES surfels of a page: work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n]. A surfel passes
-// through the cells that the box around its disc touches.
+// through the cells that the box around its disc touches. Most cells are marked by many surfels, most of which touch at most two cells
+// along an axis: these are looked at together first.
 //   place: corner of the map's window from that of the region [m], and the edge of a cell [m]
-//   region: blocks along each axis, and number of blocks that are asked for;  slots[z][y][x]: number of a block, or -1 if it is not
-//   i/o marks[2][asked blocks][STATE_BLOCK_CUBES], as 32-bit halves of words: cells through which frontier, and occupied, surfels pass
-__kernel void mark_state_cells(const Window window, const float4 place, const int4 region, __global const int* slots,
-                               __global const uint4* surfels, __global const ulong* alive, __global const int4* page_block,
-                               __global const uint* pages, const int count, __global uint* marks) {
+//   cells: of the region along each axis, x a multiple of 32
+//   i/o marks[2][z][y][x / 32]: a bit for each cell through which frontier, or occupied, surfels pass
+__kernel void mark_state_cells(const Window window, const float4 place, const int4 cells, __global const uint4* surfels,
+                               __global const ulong* alive, __global const int4* page_block, __global const uint* pages, const int count,
+                               __global uint* marks) {
   const int n = get_global_id(0) / PAGE_ITEMS;
   if (n >= count) return;
   const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page], first);
   if (lanes == 0) return;
   const Surfels s = load_surfels(&window, surfels, page_block[page], first);
-  int low[3][LANES], high[3][LANES];
   const float scale = 1.0f / place.w;
   const Points normal = unpack_normals(s.normal);
   const floatv rx = s.radius * sqrt(fmax(1.0f - normal.x * normal.x, 0.0f)), ry = s.radius * sqrt(fmax(1.0f - normal.y * normal.y, 0.0f)),
                rz = s.radius * sqrt(fmax(1.0f - normal.z * normal.z, 0.0f));
-  vstorev(max(floor_int((s.position.x + place.x - rx) * scale), 0), 0, low[0]);
-  vstorev(max(floor_int((s.position.y + place.y - ry) * scale), 0), 0, low[1]);
-  vstorev(max(floor_int((s.position.z + place.z - rz) * scale), 0), 0, low[2]);
-  vstorev(min(floor_int((s.position.x + place.x + rx) * scale), 16 * region.x - 1), 0, high[0]);
-  vstorev(min(floor_int((s.position.y + place.y + ry) * scale), 16 * region.y - 1), 0, high[1]);
-  vstorev(min(floor_int((s.position.z + place.z + rz) * scale), 16 * region.z - 1), 0, high[2]);
-  const uint occupied = lane_bits(MARK((s.attributes & SURFEL_OCCUPIED) != 0));
-  for (uint left = lanes; left != 0; left &= left - 1) {
-    const int m = lowest_lane(left), first_word = occupied >> m & 1 ? region.w * STATE_BLOCK_CUBES : 0;
-    for (int k = low[2][m]; k <= high[2][m]; ++k)
-      for (int j = low[1][m]; j <= high[1][m]; ++j)
-        for (int i = low[0][m]; i <= high[0][m]; ++i) {
-          const int slot = slots[((k >> 4) * region.y + (j >> 4)) * region.x + (i >> 4)];
-          if (slot < 0) continue;
-          const int cube = ((k >> 2 & 3) * 4 + (j >> 2 & 3)) * 4 + (i >> 2 & 3), bit = ((k & 3) * 4 + (j & 3)) * 4 + (i & 3);
-          __global uint* half_word = marks + 2 * (first_word + STATE_BLOCK_CUBES * slot + cube) + (bit >> 5);
-          if ((*half_word >> (bit & 31) & 1) == 0) atomic_or(half_word, 1u << (bit & 31));
+  const intv x0 = max(floor_int((s.position.x + place.x - rx) * scale), 0), y0 = max(floor_int((s.position.y + place.y - ry) * scale), 0),
+             z0 = max(floor_int((s.position.z + place.z - rz) * scale), 0),
+             x1 = min(floor_int((s.position.x + place.x + rx) * scale), cells.x - 1),
+             y1 = min(floor_int((s.position.y + place.y + ry) * scale), cells.y - 1),
+             z1 = min(floor_int((s.position.z + place.z + rz) * scale), cells.z - 1);
+  const intv kind = -MARK((s.attributes & SURFEL_OCCUPIED) != 0);
+  const intv within = lane_marks(lanes) & MARK((x0 <= x1) & (y0 <= y1) & (z0 <= z1));
+  const intv small = within & MARK(((x0 >> 5) == (x1 >> 5)) & (y1 <= y0 + 1) & (z1 <= z0 + 1));
+  const uintv bits = ((uintv)(2) << as_uintv(x1 & 31)) - ((uintv)(1) << as_uintv(x0 & 31));
+  __global const int* words = (__global const int*)marks;
+  const intv all = gather_int(words, small ? mark_word(cells, kind, x0, y0, z0) : 0) &
+                   gather_int(words, small ? mark_word(cells, kind, x0, y1, z0) : 0) &
+                   gather_int(words, small ? mark_word(cells, kind, x0, y0, z1) : 0) &
+                   gather_int(words, small ? mark_word(cells, kind, x0, y1, z1) : 0);
+  uint left = lane_bits(within & ~(small & MARK((as_uintv(all) & bits) == bits)));
+  if (left == 0) return;
+
+  int low[3][LANES], high[3][LANES], kinds[LANES];
+  vstorev(x0, 0, low[0]);
+  vstorev(y0, 0, low[1]);
+  vstorev(z0, 0, low[2]);
+  vstorev(x1, 0, high[0]);
+  vstorev(y1, 0, high[1]);
+  vstorev(z1, 0, high[2]);
+  vstorev(kind, 0, kinds);
+  for (; left != 0; left &= left - 1) {
+    const int m = lowest_lane(left);
+    for (int z = low[2][m]; z <= high[2][m]; ++z)
+      for (int y = low[1][m]; y <= high[1][m]; ++y)
+        for (int x = low[0][m]; x <= high[0][m]; ++x) {
+          __global uint* word = marks + ((kinds[m] * cells.z + z) * cells.y + y) * (cells.x / 32) + (x >> 5);
+          if ((*word >> (x & 31) & 1) == 0) atomic_or(word, 1u << (x & 31));
         }
   }
 }

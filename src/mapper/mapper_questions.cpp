@@ -82,7 +82,10 @@ StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution)
   }
   if (!looked_at.knows(state_blocks.sequence()) || state_blocks.resolution() != resolution) state_blocks.begin(resolution);
   StateBlocks::Changed changed;
-  if (const std::uint64_t last = state_blocks.sequence(); last != 0)
+  const std::uint64_t last = state_blocks.sequence();
+  if (last == 0)
+    changed.looked_at = known_blocks();
+  else
     changed = {looked_at.since(last), taken_from.since(last), surfels_changed_since(last)};
   state_blocks.update(blocks, changed, sequence, {views, seen, taking_back, map, config.seen_points});
   changes.blocks = state_blocks.changes(blocks, changes.since, map);

@@ -17,22 +17,31 @@ std::vector<BlockKey> without_twins(std::vector<BlockKey> keys) {
   return keys;
 }
 
-/// Writes the cells of a block in rows of 16 bits, lower byte first. @param bits  by cubes. @param rows  [z][y]
-void write_rows(const CellBits& bits, std::uint8_t* rows) {
-  constexpr int kEdge = StateBlock::kEdge;
-  for (int z = 0; z < kEdge; ++z)
-    for (int y = 0; y < kEdge; ++y) {
-      const CellBits::value_type* cubes = &bits[(z / 4 * 4 + y / 4) * 4];
-      const int shift = (z % 4 * 4 + y % 4) * 4;
-      const auto four = [&](int n) { return static_cast<unsigned>(cubes[n] >> shift & 15); };
-      std::uint8_t* row = rows + 2 * (z * kEdge + y);
-      row[0] = static_cast<std::uint8_t>(four(0) | four(1) << 4);
-      row[1] = static_cast<std::uint8_t>(four(2) | four(3) << 4);
-    }
+template <typename Words>
+bool are_all(const Words& words, typename Words::value_type value) {
+  return std::all_of(words.begin(), words.end(), [value](auto word) { return word == value; });
 }
 
-bool are_all(const CellBits& bits, cl_ulong word) {
-  return std::all_of(bits.begin(), bits.end(), [word](cl_ulong of_cube) { return of_cube == word; });
+CellRows rows_of(const CellBits& bits) {
+  constexpr int kEdge = StateBlock::kEdge;
+  CellRows rows;
+  for (int z = 0; z < kEdge; ++z)
+    for (int y = 0; y < kEdge; ++y) {
+      const cl_ulong* cubes = &bits[(z / 4 * 4 + y / 4) * 4];
+      const int shift = (z % 4 * 4 + y % 4) * 4;
+      unsigned row = 0;
+      for (int n = 0; n < 4; ++n) row |= static_cast<unsigned>(cubes[n] >> shift & 15) << 4 * n;
+      rows[z * kEdge + y] = static_cast<std::uint16_t>(row);
+    }
+  return rows;
+}
+
+/// As StateBlock has them: lower byte first.
+void write_rows(const CellRows& rows, std::uint8_t* bytes) {
+  for (const std::uint16_t row : rows) {
+    *bytes++ = static_cast<std::uint8_t>(row);
+    *bytes++ = static_cast<std::uint8_t>(row >> 8);
+  }
 }
 
 }  // namespace
@@ -47,16 +56,16 @@ std::vector<BlockKey> ChangedBlocks::since(std::uint64_t sequence) const {
 
 /// The smallest form: a byte if all cells are alike.
 StateBlock StateBlocks::Block::packed(const BlockKey& key) const {
-  CellBits is_free = free, is_occupied = {};
+  CellRows is_free = rows_of(free), is_occupied = {};
   if (!surfels.empty()) {
     is_occupied = surfels[1];
-    for (int n = 0; n < STATE_BLOCK_CUBES; ++n) is_free[n] &= ~(surfels[0][n] | surfels[1][n]);
+    for (std::size_t n = 0; n < is_free.size(); ++n) is_free[n] &= static_cast<std::uint16_t>(~(surfels[0][n] | surfels[1][n]));
   }
   StateBlock packed = {{key.x, key.y, key.z}, {}};
   const auto uniform = [&](SpaceState state) { packed.cells = {static_cast<std::uint8_t>(state)}; };
-  if (are_all(is_free, ~cl_ulong{0}))
+  if (are_all(is_free, 0xffff))
     uniform(SpaceState::kFree);
-  else if (are_all(is_occupied, ~cl_ulong{0}))
+  else if (are_all(is_occupied, 0xffff))
     uniform(SpaceState::kOccupied);
   else if (are_all(is_free, 0) && are_all(is_occupied, 0))
     uniform(SpaceState::kUnknown);
@@ -75,13 +84,15 @@ void StateBlocks::begin(double resolution) {
 
 void StateBlocks::update(const std::vector<BlockKey>& map_blocks, const Changed& changed, std::uint64_t sequence, const KnownWorld& world) {
   std::vector<BlockKey> fresh;
-  for (const BlockKey& key : meeting(map_blocks, reach_of_surfels(world.map), world.map.block_size()))
-    if (blocks_.find(key) == blocks_.end()) fresh.push_back(key);
+  const double margin = reach_of_surfels(world.map), block_size = world.map.block_size();
+  for (const auto* some : {&map_blocks, &changed.looked_at, &changed.surfels})
+    for (const BlockKey& key : meeting(*some, margin, block_size))
+      if (blocks_.emplace(key, Block{}).second) fresh.push_back(key);
   try {
     find_free(fresh, changed, sequence, world);
     find_surfels(fresh, changed.surfels, sequence, world.map);
   } catch (const std::exception&) {
-    begin(resolution_);  // what is half up to date is of no use
+    begin(resolution_);  // also forgets new blocks: what is half up to date is of no use
     throw;
   }
   sequence_ = sequence;
@@ -102,7 +113,7 @@ std::vector<BlockKey> StateBlocks::meeting(const std::vector<BlockKey>& map_bloc
   return without_twins(std::move(blocks));
 }
 
-/// New blocks, and those of which points were taken, are asked for from all views, the others from those that have come since.
+/// Blocks of which points were taken are asked for from all views, the others from those that have come since.
 void StateBlocks::find_free(const std::vector<BlockKey>& fresh, const Changed& changed, std::uint64_t sequence, const KnownWorld& world) {
   const double block_size = world.map.block_size();
   const std::vector<BlockKey> taken = meeting(changed.taken, kReachOfPoints * block_size, block_size);
@@ -110,16 +121,13 @@ void StateBlocks::find_free(const std::vector<BlockKey>& fresh, const Changed& c
   std::vector<std::pair<Block*, CellBits>> before;
   for (const BlockKey& key : taken)
     if (const auto known = blocks_.find(key); known != blocks_.end()) of_all.push_back({key, &known->second.free, true});
-  for (const BlockKey& key : meeting(changed.looked_at, 0, block_size)) {
-    const auto known = blocks_.find(key);
-    if (known == blocks_.end() || std::binary_search(taken.begin(), taken.end(), key)) continue;
-    if (!are_all(known->second.free, ~cl_ulong{0})) of_new.push_back({key, &known->second.free});
+  std::vector<BlockKey> looked_at = meeting(changed.looked_at, 0, block_size);
+  looked_at.insert(looked_at.end(), fresh.begin(), fresh.end());
+  for (const BlockKey& key : without_twins(std::move(looked_at))) {
+    Block& block = blocks_.at(key);
+    if (!std::binary_search(taken.begin(), taken.end(), key) && !are_all(block.free, ~cl_ulong{0})) of_new.push_back({key, &block.free});
   }
-  for (const BlockKey& key : fresh) {
-    Block& block = blocks_[key];
-    block.changed = sequence;
-    of_all.push_back({key, &block.free});
-  }
+  for (const BlockKey& key : fresh) blocks_.at(key).changed = sequence;
   for (const auto* questions : {&of_all, &of_new})
     for (const StateCells::FreeQuestion& question : *questions) before.emplace_back(&blocks_.at(question.block), *question.free);
   cells_.find_free(of_all, edge(), 0, world);
@@ -137,7 +145,7 @@ void StateBlocks::find_surfels(const std::vector<BlockKey>& fresh, const std::ve
     if (blocks_.find(key) != blocks_.end()) asked.push_back({key});
   cells_.mark(asked, edge(), map);
   for (const StateCells::Marks& marks : asked) {
-    std::vector<CellBits> surfels = {marks.frontier, marks.occupied};
+    std::vector<CellRows> surfels = {marks.frontier, marks.occupied};
     if (are_all(marks.frontier, 0) && are_all(marks.occupied, 0)) surfels.clear();
     Block& block = blocks_.at(marks.block);
     if (block.surfels == surfels) continue;

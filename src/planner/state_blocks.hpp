@@ -54,7 +54,8 @@ class StateBlocks {
   void begin(double resolution);
   double resolution() const { return resolution_; }
 
-  /// Brings all cells up to date, and those of the blocks that meet some blocks of the map come to be known.
+  /// Brings all cells up to date, and those of the blocks that meet some blocks of the map come to be known. After begin(), these must be
+  /// all of which anything is known: later, only views that have come since are asked.
   void update(const std::vector<BlockKey>& map_blocks, const Changed& changed, std::uint64_t sequence, const KnownWorld& world);
 
   /// Of the grid's blocks that meet some blocks of the map those that may have changed after `since`, sorted. They must be known.
@@ -63,7 +64,7 @@ class StateBlocks {
  private:
   struct Block {
     CellBits free = {};             ///< cells whose centre is free
-    std::vector<CellBits> surfels;  ///< cells through which frontier surfels pass, and occupied ones; empty if none does
+    std::vector<CellRows> surfels;  ///< cells through which frontier surfels pass, and occupied ones; empty if none does
     std::uint64_t changed = 0;      ///< sequence number when it was last found to be different
     StateBlock packed(const BlockKey& key) const;
   };

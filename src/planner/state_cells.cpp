@@ -59,7 +59,7 @@ MapWindow window_of(const BlockKey& first, const BlockKey& last, double edge, do
 
 }  // namespace
 
-StateCells::StateCells(Commands& commands) : commands_(commands), blocks_(commands), bits_(commands), slots_(commands), pages_(commands) {}
+StateCells::StateCells(Commands& commands) : commands_(commands), blocks_(commands), bits_(commands), marks_(commands), pages_(commands) {}
 
 void StateCells::find_free(std::vector<FreeQuestion>& questions, double edge, std::uint64_t after, const KnownWorld& world) {
   const double block_size = world.map.block_size();
@@ -110,29 +110,28 @@ void StateCells::mark_in(const BlockKey& first, const BlockKey& last, const std:
     if (const BlockIndex::Pages* own = map.index().find(block)) pages.insert(pages.end(), own->begin(), own->end());
   if (pages.empty()) return;
 
-  const Eigen::Array3i size(last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1);
-  std::vector<cl_int> slots(static_cast<std::size_t>(size.prod()), -1);
-  for (std::size_t n = 0; n < asked.size(); ++n) {
-    const BlockKey& block = asked[n]->block;
-    slots[((block.z - first.z) * size.y() + block.y - first.y) * size.x() + block.x - first.x] = static_cast<cl_int>(n);
-  }
-  const std::size_t words = asked.size() * STATE_BLOCK_CUBES;
-  bits_.resize(2 * words);
-  bits_.fill(kStage, cl_ulong{0}, 2 * words);
-  slots_.send(std::move(slots));
+  const Eigen::Array3i cells = kBlockCells * Eigen::Array3i((last.x - first.x) / 2 * 2 + 2, last.y - first.y + 1, last.z - first.z + 1);
+  const std::size_t words = static_cast<std::size_t>(cells.prod()) / 32;
+  marks_.resize(2 * words);
+  marks_.fill(kStage, cl_uint{0}, 2 * words);
   const auto page_count = static_cast<cl_int>(pages.size());
   pages_.send(std::move(pages));
   const MapWindow window = window_of(first, last, edge, margin, map.block_size());
   const Eigen::Vector3f shift = (window.corner_world() - corner_of(first, edge)).cast<float>();
   commands_.run(kStage, "mark_state_cells", page_count * (PAGE_SLOTS / commands_.lanes()), kGroup, window.window(),
                 cl_float4{{shift.x(), shift.y(), shift.z(), static_cast<float>(edge / kBlockCells)}},
-                cl_int4{{size.x(), size.y(), size.z(), static_cast<cl_int>(asked.size())}}, slots_(), map.surfels(), map.alive(),
-                map.page_block(), pages_(), page_count, bits_());
-  const std::vector<cl_ulong> found = bits_.read(2 * words);
-  for (std::size_t n = 0; n < asked.size(); ++n) {
-    const auto from = found.begin() + static_cast<std::ptrdiff_t>(n * STATE_BLOCK_CUBES);
-    std::copy_n(from, STATE_BLOCK_CUBES, asked[n]->frontier.begin());
-    std::copy_n(from + static_cast<std::ptrdiff_t>(words), STATE_BLOCK_CUBES, asked[n]->occupied.begin());
+                cl_int4{{cells.x(), cells.y(), cells.z(), 0}}, map.surfels(), map.alive(), map.page_block(), pages_(), page_count,
+                marks_());
+  const std::vector<cl_uint> found = marks_.read(2 * words);
+  for (Marks* marks : asked) {
+    const Eigen::Array3i corner =
+        kBlockCells * Eigen::Array3i(marks->block.x - first.x, marks->block.y - first.y, marks->block.z - first.z);
+    for (int row = 0; row < kBlockCells * kBlockCells; ++row) {
+      const std::size_t cell =
+          (static_cast<std::size_t>(corner.z() + row / kBlockCells) * cells.y() + corner.y() + row % kBlockCells) * cells.x() + corner.x();
+      marks->frontier[row] = static_cast<std::uint16_t>(found[cell / 32] >> cell % 32);
+      marks->occupied[row] = static_cast<std::uint16_t>(found[words + cell / 32] >> cell % 32);
+    }
   }
 }
 

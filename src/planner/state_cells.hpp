@@ -16,6 +16,9 @@ namespace frontier_surfels {
 /// A bit for each cell of a block of the grid, in words of 4 x 4 x 4 cells: the kernel file says where.
 using CellBits = std::array<cl_ulong, STATE_BLOCK_CUBES>;
 
+/// The same in rows of 16 cells along x: [z][y].
+using CellRows = std::array<std::uint16_t, 256>;
+
 class StateCells {
  public:
   /// A block of the grid whose free cells are to be found.
@@ -28,7 +31,7 @@ class StateCells {
   /// A block of the grid, and the cells through which frontier and occupied surfels pass.
   struct Marks {
     BlockKey block;
-    CellBits frontier = {}, occupied = {};
+    CellRows frontier = {}, occupied = {};
   };
 
   explicit StateCells(Commands& commands);
@@ -48,7 +51,7 @@ class StateCells {
   Commands& commands_;
   SentArray<cl_float4> blocks_;
   DeviceArray<cl_ulong> bits_;
-  SentArray<cl_int> slots_;
+  DeviceArray<cl_uint> marks_;
   SentArray<cl_uint> pages_;
 };
 
