@@ -49,35 +49,95 @@ TEST(MapperStateChanges, CellsAgainstPointsAndSurfels) {
   for (const std::size_t some : count) EXPECT_GT(some, 500U);
 }
 
-void expect_same(const Mapper& mapper, StateGrid& grid) {
-  grid.take(mapper.state_changes(grid.sequence(), kResolution));
-  StateGrid whole(kResolution);
-  ASSERT_TRUE(whole.apply(mapper.state_changes(0, kResolution)));
-  EXPECT_EQ(grid.whole().blocks, whole.whole().blocks);
-  EXPECT_EQ(grid.sequence(), mapper.sequence());
-}
+/// The same frames twice: what the mapper keeps of its cells against cells that are all found anew.
+struct Followed {
+  Mapper mapper, anew;
+  StateGrid grid{kResolution};
+
+  explicit Followed(const Config& config) : mapper(config), anew(config) {}
+
+  Report integrate(const DepthFrame& frame) {
+    anew.integrate(frame);
+    return mapper.integrate(frame);
+  }
+
+  StateGrid whole(double resolution) {
+    anew.state_changes(0, resolution / 2 + 0.3);  // cells of another size: those that are kept are dropped
+    StateGrid whole(resolution);
+    EXPECT_TRUE(whole.apply(anew.state_changes(0, resolution)));
+    return whole;
+  }
+
+  void expect_same(StateGrid& follower) {
+    follower.take(mapper.state_changes(follower.sequence(), follower.resolution()));
+    EXPECT_EQ(follower.whole().blocks, whole(follower.resolution()).whole().blocks) << mapper.sequence();
+    EXPECT_EQ(follower.sequence(), mapper.sequence());
+  }
+  void expect_same() { expect_same(grid); }
+};
 
 TEST(MapperStateChanges, ChangesAddUpToTheWhole) {
   const Frames frames = orbit_frames(coarse_camera(), 24, 5);
-  Mapper mapper(as_recorded());
-  StateGrid grid(kResolution);
+  Followed both(as_recorded());
   std::size_t n = 0;
   for (const auto& frame : frames) {
-    mapper.integrate(frame.view());
-    if (++n % 5 == 0) expect_same(mapper, grid);
+    both.integrate(frame.view());
+    if (++n % 5 == 0) both.expect_same();
   }
-  EXPECT_GT(grid.whole().blocks.size(), 20U);
-  expect_same(mapper, grid);
-  EXPECT_TRUE(mapper.state_changes(grid.sequence(), kResolution).blocks.empty());
-  const std::vector<Surfel> surfels = mapper.surfels();
-  mapper.reset();
-  expect_same(mapper, grid);
-  EXPECT_TRUE(grid.whole().blocks.empty());
-  mapper.integrate(frames.front().view());
-  expect_same(mapper, grid);
-  mapper.load(surfels);
-  expect_same(mapper, grid);
-  EXPECT_GT(grid.whole().blocks.size(), 20U);
+  EXPECT_GT(both.grid.whole().blocks.size(), 20U);
+  both.expect_same();
+  EXPECT_TRUE(both.mapper.state_changes(both.grid.sequence(), kResolution).blocks.empty());
+  const std::vector<Surfel> surfels = both.mapper.surfels();
+  for (Mapper* mapper : {&both.mapper, &both.anew}) mapper->reset();
+  both.expect_same();
+  EXPECT_TRUE(both.grid.whole().blocks.empty());
+  both.integrate(frames.front().view());
+  both.expect_same();
+  for (Mapper* mapper : {&both.mapper, &both.anew}) mapper->load(surfels);
+  both.expect_same();
+  EXPECT_GT(both.grid.whole().blocks.size(), 20U);
+}
+
+TEST(MapperStateChanges, ReadersDoNotDisturbEachOther) {
+  Followed both(as_recorded());
+  StateGrid slow(kResolution), coarse(0.13);
+  std::size_t n = 0;
+  for (const auto& frame : orbit_frames(coarse_camera(), 24, 5)) {
+    both.integrate(frame.view());
+    ++n;
+    if (n % 2 == 0) both.expect_same();
+    if (n % 5 == 0) both.expect_same(slow);
+    if (n % 7 == 0) both.expect_same(coarse);
+  }
+}
+
+/// A reader that asks seldom gets what one gets that asks always, also if nobody has asked between.
+TEST(MapperStateChanges, ABoxComesAndGoes) {
+  Config config = as_recorded();
+  config.z_max = 3;
+  Followed both(config);
+  StateGrid slow(kResolution);
+  std::size_t taken_back = 0;
+  const auto free_behind = [&] { return both.grid.state({0.05F, 0, 1.6F}) == SpaceState::kFree; };
+  for (int n = 0; n < 60; ++n) {
+    const double x = 0.008 * n, front = 1.5, half_side = 0.25;
+    replay::RecordedFrame frame = plane_frame(working_camera(), 2, Eigen::Isometry3d(Eigen::Translation3d(x, 0, 0)));
+    const Intrinsics& camera = frame.intrinsics;
+    for (int v = 0; n >= 20 && n < 40 && v < camera.height; ++v)
+      for (int u = 0; u < camera.width; ++u)
+        if (std::abs(x + (u - camera.cx) / camera.fx * front) < half_side && std::abs((v - camera.cy) / camera.fy * front) < half_side)
+          frame.depth.at<float>(v, u) = static_cast<float>(front);
+    taken_back += both.integrate(frame.view()).taken_back;
+    if (n % 4 == 3) both.expect_same();
+    if (n == 25 || n == 50) both.expect_same(slow);
+    if (n == 19 || n == 59) {
+      EXPECT_TRUE(free_behind());
+    }
+    if (n == 39) {
+      EXPECT_FALSE(free_behind());
+    }
+  }
+  EXPECT_GT(taken_back, 100U);
 }
 
 /// What views have seen stays free in the grid when they are forgotten, where no surfel stands.

@@ -81,7 +81,8 @@ class Mapper {
 
   /// The blocks of a grid of states that may have changed since the map had sequence number `since`; 0, or a number from before the map was
   /// replaced: the whole grid (StateChanges::since is 0 then). What is only forgotten, because kept views are replaced by seen points or
-  /// blocks go to the map folder, counts as no change. StateGrid::take() tells what is different. @param resolution  edge of a cell [m]
+  /// blocks go to the map folder, counts as no change. StateGrid::take() tells what is different. Calls with the resolution of
+  /// the call before take far less time: the mapper keeps the cells of the last resolution. @param resolution  edge of a cell [m]
   /// @throws Error  the resolution is not from 0.02 to 1 m
   StateChanges state_changes(std::uint64_t since, double resolution) const;
 

@@ -149,6 +149,9 @@ namespace frontier_surfels {
 #define STATE_CUBE 4
 #define STATE_CHUNK 64
 
+// The grid of states - ours: a block of 16^3 cells has STATE_BLOCK_CUBES cubes of 4^3 cells, with a word of 64 bits each.
+#define STATE_BLOCK_CUBES 64
+
 // Values of views, for planners - ours. Far surfels are merged by cells of the map's blocks: on level 1 of MERGE_LEVELS by MERGE_CELLS
 // along a block's edge, and on each further level by half as many.
 #define MERGE_LEVELS 3

@@ -192,10 +192,12 @@ std::vector<View> RecentViews::views_before(std::uint64_t number) const {
   return views;
 }
 
-int RecentViews::prepare(const Eigen::Isometry3d& T_world_frame) {
+int RecentViews::prepare(const Eigen::Isometry3d& T_world_frame, std::uint64_t after) {
+  const auto newer = static_cast<std::size_t>(
+      std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) { return kept.number <= after; }) - kept_.begin());
   std::vector<View> views;
   std::vector<float> lanes(view_groups() * VIEW_LANE_FIELDS * VIEW_GROUP, 0.0F);
-  for (const std::size_t number : spread(kept_.size())) {
+  for (const std::size_t number : spread(newer)) {
     const Kept& kept = kept_[number];
     const Eigen::Isometry3d T_view_frame = kept.T_world_camera.inverse() * T_world_frame;
     const std::size_t n = views.size();
@@ -204,7 +206,7 @@ int RecentViews::prepare(const Eigen::Isometry3d& T_world_frame) {
   }
   views_.send(std::move(views));
   view_lanes_.send(std::move(lanes));
-  return static_cast<int>(kept_.size());
+  return static_cast<int>(newer);
 }
 
 bool RecentViews::differs_enough() const {

@@ -58,7 +58,8 @@ class RecentViews {
 
   /// Sends the kept views to the device, each with its pose relative to the current camera, or to another frame. @return their number
   int prepare() { return prepare(current_.T_world_camera); }
-  int prepare(const Eigen::Isometry3d& T_world_frame);
+  /// @param after  number of a view: only those that came later are sent
+  int prepare(const Eigen::Isometry3d& T_world_frame, std::uint64_t after = 0);
 
   /// Keeps the current view if its camera or pose differs enough from every kept view. @return whether it was kept
   bool keep_current();

@@ -121,7 +121,7 @@ void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels, const SeenSpace
   load_views(saved_views);
   map.set_lost(false);
   ++sequence;
-  looked_at.begin(sequence);
+  for (ChangedBlocks* changed : {&looked_at, &taken_from, &lost_page}) changed->begin(sequence);
   if (!archive) return;
   archive->clear();
   archive->note_changed(seen.blocks_with_points());

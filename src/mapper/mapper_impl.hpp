@@ -92,6 +92,7 @@ struct Mapper::Impl {
   std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
   StateChanges state_changes(std::uint64_t since, double resolution);
   std::vector<BlockKey> known_blocks() const;
+  std::vector<BlockKey> surfels_changed_since(std::uint64_t since) const;
   std::vector<FirstSurfel> first_within(const std::vector<MovingBox>& boxes, bool frontier_counts);
   std::vector<ViewValue> evaluate_views(const ViewQuestion& question);
   SavedMap saved_map();
@@ -124,7 +125,9 @@ struct Mapper::Impl {
   // Planners' questions
   PointStates point_states;
   Boundaries boundaries;
-  LookedAt looked_at;
+  ChangedBlocks looked_at;   ///< a frame's view reached them
+  ChangedBlocks taken_from;  ///< points were taken back, or given back
+  ChangedBlocks lost_page;   ///< all surfels of a page were removed
   StateBlocks state_blocks;
   ViewValues view_values;
 

@@ -75,16 +75,32 @@ StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution)
   const bool is_part = looked_at.knows(since) && since <= sequence;
   StateChanges changes = {sequence, is_part ? since : 0, resolution, {}};
   std::vector<BlockKey> blocks = is_part ? looked_at.since(since) : known_blocks();
+  const auto add = [&blocks](const std::vector<BlockKey>& more) { blocks.insert(blocks.end(), more.begin(), more.end()); };
   if (is_part) {
-    const std::vector<BlockKey> with_surfels = map.blocks_changed_since(static_cast<std::uint32_t>(since));
-    blocks.insert(blocks.end(), with_surfels.begin(), with_surfels.end());
+    add(surfels_changed_since(since));
+    add(taken_from.since(since));
   }
-  changes.blocks = state_blocks.find(blocks, resolution, point_states, {views, seen, taking_back, map, config.seen_points});
+  if (!looked_at.knows(state_blocks.sequence()) || state_blocks.resolution() != resolution) state_blocks.begin(resolution);
+  StateBlocks::Changed changed;
+  const std::uint64_t last = state_blocks.sequence();
+  if (last == 0)
+    changed.looked_at = known_blocks();
+  else
+    changed = {looked_at.since(last), taken_from.since(last), surfels_changed_since(last)};
+  state_blocks.update(blocks, changed, sequence, {views, seen, taking_back, map, config.seen_points});
+  changes.blocks = state_blocks.changes(blocks, changes.since, map);
   if (!is_part)
     changes.blocks.erase(std::remove_if(changes.blocks.begin(), changes.blocks.end(),
                                         [](const StateBlock& block) { return block.cells == std::vector<std::uint8_t>{0}; }),
                          changes.blocks.end());
   return changes;
+}
+
+std::vector<BlockKey> Mapper::Impl::surfels_changed_since(std::uint64_t since) const {
+  std::vector<BlockKey> blocks = map.blocks_changed_since(static_cast<std::uint32_t>(since));
+  const std::vector<BlockKey> without_page = lost_page.since(since);
+  blocks.insert(blocks.end(), without_page.begin(), without_page.end());
+  return blocks;
 }
 
 /// The blocks in memory of which anything is known.

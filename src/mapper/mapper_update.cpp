@@ -148,6 +148,8 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
   report.view_kept = views.keep_current();
   sequence = report.sequence;
   looked_at.note(blocks_of_view(image.intrinsics, pose.T_world_camera, config.z_max, map.block_size()).blocks, sequence);
+  taken_from.note(taking_back.take_changed(), sequence);
+  lost_page.note(shrunk, sequence);
   frame_on_device = pages_changed ? 0 : sequence;
   pages_changed = false;
   if (archive) {

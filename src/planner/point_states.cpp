@@ -16,12 +16,6 @@ constexpr std::size_t kFewPoints = 1000;          // most blocks of their window
 constexpr int kCubes = STATE_CELLS / STATE_CUBE;  // along a block's edge
 constexpr int kCellsOfCube = STATE_CUBE * STATE_CUBE * STATE_CUBE;
 
-Frame frame_of(const MapWindow& window, const KnownWorld& world) {
-  Frame frame = make_frame(window, world.use_seen ? &world.seen : nullptr);
-  frame.has_taken = world.use_seen && !world.taking_back.taken().empty() ? 1 : 0;
-  return frame;
-}
-
 /// The blocks in which some points lie.
 MapWindow window_around(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, double block_size) {
   Eigen::AlignedBox3f box;
@@ -45,6 +39,14 @@ std::vector<BlockKey> blocks_around(const std::vector<Eigen::Vector3f>& points, 
 }
 
 }  // namespace
+
+Frame open_window(const MapWindow& window, const KnownWorld& world) {
+  world.taking_back.open_window(window, world.seen);
+  world.seen.open_window(window);
+  Frame frame = make_frame(window, world.use_seen ? &world.seen : nullptr);
+  frame.has_taken = world.use_seen && !world.taking_back.taken().empty() ? 1 : 0;
+  return frame;
+}
 
 /// The points of a window by cells.
 struct PointStates::Sorted {
@@ -94,15 +96,15 @@ struct PointStates::Sorted {
 PointStates::PointStates(Commands& commands)
     : commands_(commands), points_(commands), chunks_(commands), cell_begin_(commands), pages_(commands), states_(commands) {}
 
-std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world, bool with_surfels) {
+std::vector<SpaceState> PointStates::find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world) {
   std::vector<SpaceState> states(points_world.size(), SpaceState::kUnknown);
   for (const auto& [region, asked] : by_region(points_world, world.map.block_size(), "it has no state."))
-    find_some(points_world, asked, world, with_surfels, states);
+    find_some(points_world, asked, world, states);
   return states;
 }
 
 void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
-                            bool with_surfels, std::vector<SpaceState>& states) {
+                            std::vector<SpaceState>& states) {
   const double block_size = world.map.block_size();
   const MapWindow window = window_around(points, asked, block_size);
   const Eigen::Vector3d corner = window.corner_world();
@@ -117,14 +119,13 @@ void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const st
   chunks_.send(sorted.chunks);
   states_.resize(asked.size());
   const int view_count = world.views.prepare(Eigen::Isometry3d(Eigen::Translation3d(corner)));
-  world.taking_back.open_window(window, world.seen);
-  world.seen.open_window(window);
+  const Frame frame = open_window(window, world);
   const SeenPoints &seen = world.seen, &taken = world.taking_back.taken();
-  commands_.run(kStage, "find_states", sorted.chunks.size(), commands_.device().heavy_group(), frame_of(window, world), world.views.views(),
+  commands_.run(kStage, "find_states", sorted.chunks.size(), commands_.device().heavy_group(), frame, world.views.views(),
                 world.views.view_lanes(), static_cast<cl_int>(view_count), world.views.depths(), seen.slots(), seen.tables(),
                 seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), points_(), static_cast<cl_int>(stride), chunks_(),
                 static_cast<cl_int>(sorted.chunks.size()), states_());
-  if (with_surfels) mark_occupied(window, points, asked, sorted, world.map);
+  mark_occupied(window, points, asked, sorted, world.map);
   const std::vector<cl_uchar> found = states_.read(asked.size());
   for (std::size_t n = 0; n < asked.size(); ++n) states[sorted.numbers[n]] = static_cast<SpaceState>(found[n]);
 }

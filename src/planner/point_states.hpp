@@ -24,26 +24,21 @@ struct KnownWorld {
   bool use_seen;  ///< Config::seen_points
 };
 
+/// Sends the tables of seen and taken points of a window's blocks. @return what kernels are told of the window
+Frame open_window(const MapWindow& window, const KnownWorld& world);
+
 class PointStates {
  public:
   explicit PointStates(Commands& commands);
 
   /// The states of points, in the order of the points. What the last frame has forgotten must have been remembered.
   /// @throws Error  a point is not finite
-  std::vector<SpaceState> find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world) {
-    return find(points_world, world, true);
-  }
-
-  /// The same, but surfels do not count: no point is occupied.
-  std::vector<SpaceState> find_free(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world) {
-    return find(points_world, world, false);
-  }
+  std::vector<SpaceState> find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world);
 
  private:
   struct Sorted;
-  std::vector<SpaceState> find(const std::vector<Eigen::Vector3f>& points_world, const KnownWorld& world, bool with_surfels);
   void find_some(const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked, const KnownWorld& world,
-                 bool with_surfels, std::vector<SpaceState>& states);
+                 std::vector<SpaceState>& states);
   void mark_occupied(const MapWindow& window, const std::vector<Eigen::Vector3f>& points, const std::vector<std::uint32_t>& asked,
                      const Sorted& sorted, const SurfelMap& map);
 

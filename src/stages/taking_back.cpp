@@ -48,12 +48,14 @@ void TakingBack::clear() {
   last_frames_.clear();
   pixels_ = 0;
   taken_.clear();
+  changed_.clear();
 }
 
 void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
   if (!is_on_) return;
   taken_.choose_spacing(seen.spacing());
   if (taken_.shift() != seen.shift()) {  // points of another lattice are of no use
+    for (const BlockKey& block : taken_.blocks_with_points()) changed_.push_back(block);
     taken_.clear();
     taken_.choose_spacing(seen.spacing());
   }
@@ -208,7 +210,11 @@ std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, 
 void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
                                const std::vector<Brick>& bricks) {
   std::vector<cl_int4> taken_by;
+  const Window& w = window.window();
   for (const Brick& b : bricks) {
+    const auto block = [&](int axis) { return b.place.s[axis] >> taken_.shift(); };
+    const BlockKey key = {w.origin_x + block(0), w.origin_y + block(1), w.origin_z + block(2)};
+    if (changed_.empty() || changed_.back() != key) changed_.push_back(key);
     taken_by.push_back(b.place);
     taken_by.back().s[3] = taken_.own_brick(b.table, b.brick);
   }

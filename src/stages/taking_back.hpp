@@ -8,6 +8,8 @@
 #include <array>
 #include <deque>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "frame/recent_views.hpp"
 #include "frame/working_image.hpp"
@@ -43,6 +45,9 @@ class TakingBack {
 
   /// Forgets all frames and all taken points.
   void clear();
+
+  /// The blocks of the map whose taken points may have changed since the last call; in no order, some more than once.
+  std::vector<BlockKey> take_changed() { return std::exchange(changed_, {}); }
 
   SeenPoints& taken() { return taken_; }
   const SeenPoints& taken() const { return taken_; }
@@ -86,6 +91,7 @@ class TakingBack {
   const TakeBackLimits limits_;
   const bool is_on_;
   SeenPoints taken_;
+  std::vector<BlockKey> changed_;
   std::deque<LastFrame> last_frames_;  ///< newest first, at most LAST_FRAMES
   std::size_t pixels_ = 0;             ///< whose surface has taken space back since the last frame that did not fail
   std::size_t room_size_ = 0;          ///< [pixel]
