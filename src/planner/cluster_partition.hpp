@@ -48,7 +48,8 @@ class ClusterPartition {
 
   Cells sort_changes(const Cells& changed);
   Cells join(Cells fresh);
-  std::uint32_t neighbour_with_room(const ClusterCell& cell);
+  std::uint32_t neighbour_with_room(const ClusterCell& cell) const;
+  Cells next_ring(const std::vector<std::pair<ClusterCell*, std::uint32_t>>& ring);
   void divide(std::uint32_t id);
   void found(const Cells& cells);
   void merge_small();
@@ -68,6 +69,7 @@ class ClusterPartition {
   std::size_t visited_ = 0;
   std::set<std::uint32_t> touched_;  ///< groups that have changed in this update
   std::set<std::uint32_t> shrunk_;   ///< groups that have lost cells in this update
+  std::set<std::uint32_t> torn_;     ///< those of them that may have fallen apart
 };
 
 }  // namespace frontier_surfels
