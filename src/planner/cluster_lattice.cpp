@@ -38,6 +38,63 @@ bool within(const Eigen::Vector3f& v, float limit) {
 
 }  // namespace
 
+// These are called for each surfel. They are inline because calls within a shared library go through a table.
+
+inline BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
+  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
+}
+
+/// Nullptr if no surfel near this id was ever seen.
+inline ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
+  const std::size_t page = id / kPage;
+  return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
+}
+
+inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
+  ClusterCell& cell = this->cell(surfel.cell);
+  if (!cell.changed) changed_.push_back(&cell);
+  cell.changed = true;
+  if (!surfel.is_frontier()) {
+    cell.occupied += static_cast<std::uint32_t>(sign);
+    return;
+  }
+  const BlockKey& key = cell.key;
+  cell.frontier += static_cast<std::uint32_t>(sign);
+  cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
+  const int corner[] = {key.x, key.y, key.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
+    cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
+  }
+}
+
+inline void ClusterLattice::change(Kept& before, Kept now) {
+  // Of an occupied surfel only its cell counts.
+  const bool same_cell = before.exists() && before.cell == now.cell;
+  if (!same_cell || before.is_frontier() || now.is_frontier()) {
+    if (before.exists()) count(before, -1);
+    count(now, 1);
+  }
+  before = now;
+}
+
+/// Nullptr if there is none. Those that were asked for before are tried first.
+inline ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
+  auto& [key, recent] = recent_cubes_[std::hash<BlockKey>()(cube) % kRecent];
+  if (recent != nullptr && key == cube) return recent;
+  const auto at = cubes_.find(cube);
+  if (at == cubes_.end()) return nullptr;
+  key = cube;
+  recent = &at->second;
+  return recent;
+}
+
+inline ClusterCell* ClusterLattice::find(const BlockKey& key) {
+  const Cube* cube = find_cube(cube_of(key));
+  const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
+  return number == 0 ? nullptr : &cell(number);
+}
+
 void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
@@ -58,12 +115,6 @@ void ClusterLattice::check(const Changes& changes) const {
       throw Error("Surfel " + std::to_string(s.id) +
                   " cannot be clustered: its position, its normal or its radius is not finite, or far too large.");
   }
-}
-
-/// Nullptr if no surfel near this id was ever seen.
-ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
-  const std::size_t page = id / kPage;
-  return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
 }
 
 void ClusterLattice::remove(const std::vector<std::uint32_t>& ids) {
@@ -104,51 +155,6 @@ void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
     now.cell = (cells[n] != nullptr ? *cells[n] : cell_at(keys[n])).number;
     change(before, now);
   }
-}
-
-void ClusterLattice::change(Kept& before, Kept now) {
-  // Of an occupied surfel only its cell counts.
-  const bool same_cell = before.exists() && before.cell == now.cell;
-  if (!same_cell || before.is_frontier() || now.is_frontier()) {
-    if (before.exists()) count(before, -1);
-    count(now, 1);
-  }
-  before = now;
-}
-
-void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
-  ClusterCell& cell = this->cell(surfel.cell);
-  if (!cell.changed) changed_.push_back(&cell);
-  cell.changed = true;
-  if (!surfel.is_frontier()) {
-    cell.occupied += static_cast<std::uint32_t>(sign);
-    return;
-  }
-  const BlockKey& key = cell.key;
-  cell.frontier += static_cast<std::uint32_t>(sign);
-  cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
-  const int corner[] = {key.x, key.y, key.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
-    cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
-  }
-}
-
-/// Nullptr if there is none. Those that were asked for before are tried first.
-ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
-  auto& [key, recent] = recent_cubes_[std::hash<BlockKey>()(cube) % kRecent];
-  if (recent != nullptr && key == cube) return recent;
-  const auto at = cubes_.find(cube);
-  if (at == cubes_.end()) return nullptr;
-  key = cube;
-  recent = &at->second;
-  return recent;
-}
-
-ClusterCell* ClusterLattice::find(const BlockKey& key) {
-  const Cube* cube = find_cube(cube_of(key));
-  const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
-  return number == 0 ? nullptr : &cell(number);
 }
 
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
@@ -228,10 +234,6 @@ void ClusterLattice::forget(ClusterCell& cell) {
   if (--cube->count > 0) return;
   recent_cubes_[std::hash<BlockKey>()(cube_key) % kRecent] = {};
   cubes_.erase(cube_key);
-}
-
-BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

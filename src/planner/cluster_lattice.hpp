@@ -70,7 +70,7 @@ class ClusterLattice {
       return signed_radius == other.signed_radius && position == other.position && normal == other.normal;
     }
   };
-  static constexpr std::size_t kPage = 4096;
+  static constexpr std::size_t kPage = 64;
   struct alignas(64) Page {
     std::array<Kept, kPage> surfels;
   };
