@@ -104,13 +104,16 @@ std::set<std::uint32_t> ClusterPartition::update(const Cells& changed) {
 /// Takes cells that have no frontier any more out of their clusters. @return cells that have one, but no cluster yet
 ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
   Cells fresh;
+  std::uint32_t last = 0;
+  const auto touch = [&](std::uint32_t id) {  // mostly, cells that follow each other are of the same cluster
+    if (id != 0 && id != last) touched_.insert(id);
+    if (id != 0) last = id;
+  };
   for (ClusterCell* cell : changed) {
     ++visited_;
     if ((cell->occupied > 0) != cell->was_occupied)
-      ClusterLattice::for_neighbours(*cell, [this](const ClusterCell& other) {
-        if (other.cluster != 0) touched_.insert(other.cluster);
-      });
-    if (cell->cluster != 0) touched_.insert(cell->cluster);
+      ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) { touch(other.cluster); });
+    touch(cell->cluster);
     if (cell->frontier > 0 && cell->cluster == 0) fresh.push_back(cell);
     if (cell->frontier == 0 && cell->cluster != 0) {
       shrunk_.insert(cell->cluster);
@@ -138,7 +141,7 @@ void ClusterPartition::count(std::uint32_t id) {
 
 /// Gives new cells to clusters next to them, ring by ring. @return those that no cluster has room for
 ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
-  std::set<std::uint32_t> grown;
+  std::map<std::uint32_t, std::size_t> grown;  // numbers of cells before, by cluster
   for (Cells open = fresh; !open.empty();) {
     std::vector<std::pair<ClusterCell*, std::uint32_t>> ring;
     for (ClusterCell* cell : open) {
@@ -151,14 +154,17 @@ ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
     // Cells of a ring do not see each other: else those with larger keys would be reached first.
     for (const auto& [cell, id] : ring) {
       cell->cluster = id;
-      groups_.at(id).cells.push_back(cell);
-      grown.insert(id);
+      Cells& cells = groups_.at(id).cells;
+      grown.emplace(id, cells.size());
+      cells.push_back(cell);
     }
     open = next_ring(ring);
   }
-  for (const std::uint32_t id : grown) {
+  for (const auto& [id, before] : grown) {
     Cells& cells = groups_.at(id).cells;
-    std::sort(cells.begin(), cells.end(), by_key);
+    const auto added = cells.begin() + static_cast<std::ptrdiff_t>(before);
+    std::sort(added, cells.end(), by_key);
+    std::inplace_merge(cells.begin(), added, cells.end(), by_key);
     touched_.insert(id);
   }
   fresh.erase(std::remove_if(fresh.begin(), fresh.end(), [](const ClusterCell* cell) { return cell->cluster != 0; }), fresh.end());
@@ -180,13 +186,13 @@ ClusterPartition::Cells ClusterPartition::next_ring(const std::vector<std::pair<
 }
 
 /// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
-std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) const {
-  Contacts contacts;
+std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
+  Contacts& contacts = cell_contacts_;  // kept for its memory
+  contacts.clear();
   ClusterLattice::for_neighbours(cell, [&](const ClusterCell& other) {
     if (other.cluster != 0) add_contact(other.cluster, contacts);
   });
-  if (contacts.empty()) return 0;
-  std::sort(contacts.begin(), contacts.end(), more_contact);
+  if (contacts.size() > 1) std::sort(contacts.begin(), contacts.end(), more_contact);
   for (const auto& [id, pairs] : contacts) {
     CellBox box = groups_.at(id).box;
     box.extend(CellBox(cell.key));
