@@ -94,9 +94,10 @@ class Mapper {
   /// The surfels in memory, ordered by id, and with a map_folder also those on disk, whose id is 0. @throws FileError
   std::vector<Surfel> whole_map() const;
 
-  /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact. Those of earlier
-  /// frames may also contain unchanged surfels near changed ones, and ids that were free before. Surfels that move to the map folder are
-  /// reported as removed, and as updated with new ids when they come back.
+  /// Changes since the map had sequence number `since`; 0 gives the whole map. The changes of the last frame are exact, and so are
+  /// those since a reader's last question, be it many frames ago, as long as there are few readers: they contain what frames have touched,
+  /// and no ids but those of surfels that were there. Else they may contain what earlier frames have touched, and ids that were free
+  /// before. Surfels that move to the map folder are reported as removed, and as updated with new ids when they come back.
   ///
   /// Any number of readers may follow the map: each begins with since = 0, and then gives the sequence number of its last Changes. Until a
   /// reader has been told that a surfel is gone, its id is not given again, be it by frames, reset or load. A reader that has not asked for

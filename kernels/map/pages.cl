@@ -173,14 +173,12 @@ __kernel void restore_surfels(const uint count, __global const uint* kept_surfel
 
 // One work item handles a page of the window at the end of a frame.
 //   in  pages[count], alive;   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
-//   out changed_pages[count], changes[count]: the pages, and what this frame has changed in them;  empty[count]: 1 if nothing is left
+//   out changes[count]: what this frame has changed in them;  empty[count]: 1 if nothing is left
 __kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
-                           const uint frame, __global int4* page_block, __global uint* changed_pages, __global ulong* changes,
-                           __global uchar* empty) {
+                           const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
-  changed_pages[n] = page;
   changes[n] = changed[page];
   empty[n] = alive[page] == 0 ? 1 : 0;
   if (changed[page] != 0) page_block[page].w = (int)frame;
@@ -188,14 +186,10 @@ __kernel void finish_pages(__global const uint* pages, const uint count, __globa
 }
 
 // One work item handles a slot of a list: it copies its surfel for the host.
-//   in  slots[count];   out gathered[count];  blocks[count]: x, y, z of the surfel's block, w: 1 if it is alive
-__kernel void gather_surfels(__global const uint* slots, const uint count, __global const ulong* alive, __global const int4* page_block,
-                             __global const uint4* surfels, __global uint4* gathered, __global int4* blocks) {
+//   in  slots[count];   out gathered[count]
+__kernel void gather_surfels(__global const uint* slots, const uint count, __global const uint4* surfels, __global uint4* gathered) {
   const uint n = get_global_id(0);
-  if (n >= count) return;
-  const uint slot = slots[n];
-  gathered[n] = surfels[slot];
-  blocks[n] = (int4)(page_block[slot / PAGE_SLOTS].xyz, is_alive(alive, slot) ? 1 : 0);
+  if (n < count) gathered[n] = surfels[slots[n]];
 }
 
 // One work item handles a slot of a list of pages: it copies its surfel for the host, which gets the pages one after the other.

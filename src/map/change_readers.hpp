@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <optional>
+#include <vector>
 
 namespace frontier_surfels {
 
@@ -27,8 +27,12 @@ class ChangeReaders {
     return any;
   }
 
-  /// The map that the slowest reader has; none without readers.
-  std::optional<std::uint64_t> slowest() const { return readers_.empty() ? std::nullopt : std::make_optional(readers_.begin()->first); }
+  /// The maps that readers have, ascending.
+  std::vector<std::uint64_t> maps() const {
+    std::vector<std::uint64_t> maps;
+    for (const auto& [sequence, count] : readers_) maps.push_back(sequence);
+    return maps;
+  }
 
   /// Is a reader of this map known, or of an earlier one?
   bool knows(std::uint64_t since) const { return !readers_.empty() && since >= readers_.begin()->first; }

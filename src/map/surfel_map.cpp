@@ -55,11 +55,8 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       kept_taken_(commands),
       kept_slots_(commands),
       kept_surfels_(commands),
-      changes_{FrameChanges(commands), FrameChanges(commands)},
-      empty_(commands),
-      changed_slots_(commands),
-      gathered_(commands),
-      gathered_blocks_(commands) {
+      changed_words_(commands),
+      empty_(commands) {
   grow(1024);
 }
 
@@ -208,40 +205,16 @@ void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
 }
 
 void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
-  FrameChanges& found = changes_[1 - last_];
   const auto count = static_cast<cl_uint>(window_pages());
-  found.count = count;
-  found.pages.resize(count + 1);
-  found.slots.resize(count + 1);
+  changed_words_.resize(count + 1);
   empty_.resize(count + 1);
-  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), found.pages(),
-                found.slots(), empty_());
+  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changed_words_(),
+                empty_());
+  frame_changes_ = logs_changes_ ? changed_words_.read(count) : std::vector<cl_ulong>();
   const std::vector<cl_uchar> empty = empty_.read(count);
   empty_pages_.clear();
   for (cl_uint n = 0; n < count; ++n)
     if (empty[n]) empty_pages_.push_back(n);
-}
-
-Changes SurfelMap::last_changes() {
-  const char* stage = "changes";
-  const FrameChanges& last = changes_[last_];
-  const std::uint32_t count = lists_.list_bits(stage, last.slots, last.count, changed_slots_);
-  commands_.run(stage, "to_slots", count, kGroup, last.pages(), changed_slots_(), count);
-  gathered_.resize(count);
-  gathered_blocks_.resize(count);
-  commands_.run(stage, "gather_surfels", count, kGroup, changed_slots_(), count, alive_(), page_block_(), surfels_(), gathered_(),
-                gathered_blocks_());
-  const auto slots = changed_slots_.read(count);
-  const auto surfels = gathered_.read(count);
-  const auto blocks = gathered_blocks_.read(count);
-  Changes changes;
-  for (std::size_t n = 0; n < slots.size(); ++n) {
-    if (blocks[n].s[3] != 0)
-      changes.updated.push_back(to_surfel(surfels[n], blocks[n], slots[n]));
-    else
-      changes.removed.push_back(slots[n]);
-  }
-  return changes;
 }
 
 Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const {
@@ -280,38 +253,67 @@ std::vector<Surfel> SurfelMap::download() const {
   return surfels;
 }
 
-Changes SurfelMap::changes(std::uint64_t since) const {
+Changes SurfelMap::changes(std::uint64_t since) const { return changes(log_.since(since)); }
+
+Changes SurfelMap::whole() const {
+  const ChangeLog::Words all(index_.end(), ~ChangeLog::Word{0});
+  return changes({all, all});
+}
+
+Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
+  const auto alive = alive_.read(index_.end());
   const auto blocks = page_block_.read(index_.end());
-  std::vector<Page> pages;
-  for (Page page = 0; page < blocks.size(); ++page)
-    if (static_cast<std::uint32_t>(blocks[page].s[3]) > since) pages.push_back(page);
   Changes changes;
-  visit(pages, [&](Page page, const cl_int4& block, cl_ulong alive, const cl_uint4* packed) {
-    for_each_bit(alive, [&](std::uint32_t n) { changes.updated.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
-    for_each_bit(~alive, [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
-  });
+  std::vector<cl_uint> slots;
+  for (Page page = 0; page < std::min(difference.changed.size(), alive.size()); ++page) {
+    const ChangeLog::Word changed = difference.changed[page], known = page < difference.known.size() ? difference.known[page] : 0;
+    for_each_bit(changed & alive[page], [&](std::uint32_t n) { slots.push_back(PAGE_SLOTS * page + n); });
+    for_each_bit(changed & known & ~alive[page], [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
+  }
+  changes.updated.reserve(slots.size());
+  DeviceArray<cl_uint> list(commands_);
+  DeviceArray<cl_uint4> gathered(commands_);
+  constexpr std::size_t kAtATime = PAGE_SLOTS * kGathered;
+  for (std::size_t begin = 0; begin < slots.size(); begin += kAtATime) {
+    const std::vector<cl_uint> some(slots.begin() + begin, slots.begin() + std::min(begin + kAtATime, slots.size()));
+    list.write(some);
+    gathered.resize(some.size());
+    commands_.run("changes", "gather_surfels", some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(), gathered());
+    const auto surfels = gathered.read(some.size());
+    for (std::size_t n = 0; n < some.size(); ++n) changes.updated.push_back(to_surfel(surfels[n], blocks[some[n] / PAGE_SLOTS], some[n]));
+  }
   return changes;
 }
 
-void SurfelMap::reserve_ids(std::optional<std::uint64_t> told) {
-  if (!told) {
+void SurfelMap::log_changes(const std::vector<std::uint64_t>& readers, std::uint64_t now) {
+  logs_changes_ = !readers.empty();
+  if (logs_changes_)
+    log_.divide(readers, now, alive_.read(index_.end()));
+  else
+    log_.clear();
+}
+
+void SurfelMap::reserve_ids(const std::vector<std::uint64_t>& readers, std::uint64_t now) {
+  log_changes(readers, now);
+  if (readers.empty()) {
     reserves_ids_ = false;
     index_.release(~std::uint64_t{0});
     return;
   }
-  const cl_uint frame = reserves_ids_ ? static_cast<cl_uint>(*told) : ~cl_uint{0};  // at first, all slots that are not alive are free
+  const cl_uint frame =
+      reserves_ids_ ? static_cast<cl_uint>(readers.front()) : ~cl_uint{0};  // at first, all slots that are not alive are free
   if (!reserves_ids_) reserved_.allocate(alive_.size());
   const auto pages = static_cast<cl_uint>(index_.end());
   commands_.run("changes", "reserve_slots", pages, kGroup, pages, page_block_(), alive_(), frame, reserved_());
   reserves_ids_ = true;
-  index_.release(*told);
+  index_.release(readers.front());
 }
 
 std::size_t SurfelMap::allocated_bytes() const {
   return surfels_.bytes() + alive_.bytes() + changed_.bytes() + reserved_.bytes() + page_block_.bytes();
 }
 
-std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes(); }
+std::size_t SurfelMap::bytes() const { return allocated_bytes() - untouched_bytes() + index_.bytes() + log_.bytes(); }
 
 std::size_t SurfelMap::untouched_bytes() const {
   if (!commands_.device().is_cpu) return 0;

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "frontier_surfels/types.hpp"
 #include "map/block_index.hpp"
 #include "map/block_key.hpp"
+#include "map/change_log.hpp"
 #include "map/map_window.hpp"
 #include "opencl/commands.hpp"
 #include "opencl/lists.hpp"
@@ -70,20 +70,24 @@ class SurfelMap {
   /// the map before this has succeeded. Does nothing if nothing has failed.
   /// @throws DeviceError  the device fails again (call it again later), or it has failed in replace() and the map is lost
   void roll_back();
-
-  /// Changes of the last frame.
-  Changes last_changes();
   /// @}
 
   /// All surfels, ordered by slot.
   std::vector<Surfel> download() const;
 
-  /// Content of the pages that changed after frame `since`: all their surfels as updated, all their empty slots as removed.
+  /// What has changed after the map `since`, as far as ChangeLog knows; ordered by slot.
   Changes changes(std::uint64_t since) const;
 
-  /// From now on, no id is given again that a surfel has lost after frame `told`. To be called between frames. Without a number, ids are
-  /// given again at once, as at first.
-  void reserve_ids(std::optional<std::uint64_t> told);
+  /// All surfels as updated, all empty slots as removed.
+  Changes whole() const;
+
+  /// From now on, changes are logged for these readers. To be called between frames, whenever a reader has been told of this map.
+  /// @param readers  the maps that they have, ascending; none: nothing is logged, as at first. @param now  number of this map
+  void log_changes(const std::vector<std::uint64_t>& readers, std::uint64_t now);
+
+  /// The same as log_changes(); in addition, no id is given again that a surfel has lost after the first of the readers' maps. Without
+  /// readers, ids are given again at once, as at first.
+  void reserve_ids(const std::vector<std::uint64_t>& readers, std::uint64_t now);
 
   /// @throws Error  replace() would refuse one of the surfels
   static void check(const std::vector<Surfel>& surfels);
@@ -132,15 +136,8 @@ class SurfelMap {
     std::size_t most_kept = 0, room = 0;               ///< surfels that back_up() may have to keep, and for which it has made room
   };
 
-  /// Changes of a frame.
-  struct FrameChanges {
-    explicit FrameChanges(Commands& commands) : pages(commands), slots(commands) {}
-    DeviceArray<cl_uint> pages;
-    DeviceArray<cl_ulong> slots;  ///< a word for each of the pages
-    std::size_t count = 0;        ///< of pages
-  };
-
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
+  Changes changes(const ChangeLog::Difference& difference) const;
   void begin_undo();
   void restore();
   Page add_page(const BlockKey& block);
@@ -191,13 +188,12 @@ class SurfelMap {
   DeviceArray<cl_uint4> kept_surfels_;
 
   // Changes
-  FrameChanges changes_[2];
-  int last_ = 0;  ///< which of changes_ are those of the last frame; the others are for the frame at hand
+  DeviceArray<cl_ulong> changed_words_;  ///< of this frame, one for each page of the window
+  std::vector<cl_ulong> frame_changes_;  ///< the same while changes are logged; else none
   DeviceArray<cl_uchar> empty_;
   std::vector<std::size_t> empty_pages_;  ///< indices in window_pages_
-  DeviceArray<cl_uint> changed_slots_;
-  DeviceArray<cl_uint4> gathered_;
-  DeviceArray<cl_int4> gathered_blocks_;
+  bool logs_changes_ = false;
+  ChangeLog log_;
 };
 
 }  // namespace frontier_surfels

@@ -71,6 +71,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   changed_.write(std::vector<cl_ulong>(packed.alive.size(), 0));  // a failed frame may have left bits
   page_block_.write(packed.page_block);
   index_ = std::move(packed.index);
+  if (logs_changes_) log_.note_all(frame, index_.end());
   size_ = surfels.size();
   largest_radius_ = packed.largest_radius;
   undo_ = {};
@@ -127,6 +128,7 @@ void SurfelMap::add_block(const BlockKey& block, const std::vector<std::uint8_t>
     if (reserves_ids_) reserved_.write({alive}, page);
     changed_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
+    if (logs_changes_) log_.note(frame, {page}, {alive});
   }
   size_ += surfels.size();
   for (const cl_uint4& packed : surfels) largest_radius_ = std::max<double>(largest_radius_, unpack(packed, block, block_size_).radius);
@@ -148,6 +150,8 @@ void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
     alive_.write({0}, page);
     page_block_.write({cl_int4{{block.x, block.y, block.z, static_cast<cl_int>(frame)}}}, page);
   }
+  if (logs_changes_)
+    for (const auto& [page, alive] : undo_.dropped) log_.note(frame, {page}, {alive});
   for (const Page page : pages) index_.remove_page(block, page, removal(frame));
   size_ -= dropped;
   undo_ = {};

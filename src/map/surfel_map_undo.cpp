@@ -50,8 +50,8 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
 }
 
 std::vector<BlockKey> SurfelMap::commit(std::uint32_t frame) {
+  if (logs_changes_) log_.note(frame, window_pages_, frame_changes_);  // memory may run out: while the frame can still be undone
   undo_ = {};
-  last_ = 1 - last_;
   std::vector<BlockKey> shrunk;
   for (const std::size_t n : empty_pages_) {
     const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));

@@ -39,14 +39,12 @@ Changes Mapper::changes(std::uint64_t since) const {
 Changes Mapper::Impl::changes(std::uint64_t since) {
   begin_call();
   const std::uint64_t begin = readers.knows(since) && since <= sequence ? since : 0;
-  // The last frame alone is asked for after every frame: that must not cost more than what it has changed.
-  const bool last_frame = frame_on_device == sequence && begin != 0 && begin + 1 == sequence;
-  Changes changes = last_frame ? map.last_changes() : map.changes(begin);
+  Changes changes = begin == 0 ? map.whole() : map.changes(begin);
   changes.since = begin;
   changes.sequence = sequence;
   ChangeReaders told = readers;
   told.note(since, sequence);
-  map.reserve_ids(told.slowest());
+  map.reserve_ids(told.maps(), sequence);
   readers = told;  // nothing has failed: the reader gets the changes
   return changes;
 }

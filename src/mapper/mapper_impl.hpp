@@ -135,8 +135,6 @@ struct Mapper::Impl {
   std::vector<std::string> warnings;    ///< that have not been taken
   ChangeReaders readers;
   std::uint64_t sequence = 0;
-  std::uint64_t frame_on_device = 0;  ///< sequence number of the last frame, while its changes can be read exactly; else 0
-  bool pages_changed = false;         ///< by the archive, since the last frame
 };
 
 }  // namespace frontier_surfels

@@ -1,6 +1,5 @@
 /// The flow chart of a frame: the paper's stages, and ours, in the order in which they run.
 #include <chrono>
-#include <utility>
 
 #include "frame/working_image.hpp"
 #include "map/view_blocks.hpp"
@@ -106,7 +105,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   begin_call();
   remember_forgotten();
-  if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.slowest());
+  if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.maps(), sequence);
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
   camera.set_image(image);
@@ -131,12 +130,9 @@ SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera&
 
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
 void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number) {
-  bool changed = std::exchange(pages_changed, true);  // stays true if something throws
-  const std::uint64_t exact = std::exchange(frame_on_device, 0);
   const auto reach = [&] { return map.window_reach(camera.grid(), T_world_camera) + KnownHull::kReach * config.z_max; };
-  while (archive->follow(T_world_camera.translation(), reach(), number)) changed = true;
-  pages_changed = changed;
-  if (!changed) frame_on_device = exact;
+  while (archive->follow(T_world_camera.translation(), reach(), number)) {
+  }
 }
 
 void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report) {
@@ -150,8 +146,6 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
   looked_at.note(blocks_of_view(image.intrinsics, pose.T_world_camera, config.z_max, map.block_size()).blocks, sequence);
   taken_from.note(taking_back.take_changed(), sequence);
   lost_page.note(shrunk, sequence);
-  frame_on_device = pages_changed ? 0 : sequence;
-  pages_changed = false;
   if (archive) {
     archive->note_changed(shrunk);
     archive->save_some(number);

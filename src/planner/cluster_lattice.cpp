@@ -9,6 +9,8 @@
 namespace frontier_surfels {
 namespace {
 
+constexpr std::size_t kAhead = 16;    // surfels between asking for memory and using it
+constexpr std::size_t kBatch = 64;    // surfels
 constexpr float kFarthest = 1e6F;     // [m] nothing is mapped beyond
 constexpr float kLargestRadius = 10;  // [m]
 
@@ -21,6 +23,14 @@ double area_of(float radius) {
 /// Rounded towards zero, which is quick; what is taken away again is the same.
 std::int64_t in_units(double value, double unit) { return static_cast<std::int64_t>(value * (1 / unit)); }
 
+/// Asks for the two cache lines of a surfel or cell that are going to be used.
+template <typename T>
+void prefetch(const T* at) {
+  if (at == nullptr) return;
+  __builtin_prefetch(at, 1);
+  if (sizeof(T) > 64) __builtin_prefetch(reinterpret_cast<const char*>(at) + 64, 1);
+}
+
 /// False for what is not finite.
 bool within(const Eigen::Vector3f& v, float limit) {
   return std::abs(v.x()) <= limit && std::abs(v.y()) <= limit && std::abs(v.z()) <= limit;
@@ -28,16 +38,75 @@ bool within(const Eigen::Vector3f& v, float limit) {
 
 }  // namespace
 
+// These are called for each surfel. They are inline because calls within a shared library go through a table.
+
+inline BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
+  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
+}
+
+/// Nullptr if no surfel near this id was ever seen.
+inline ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
+  const std::size_t page = id / kPage;
+  return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
+}
+
+inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
+  ClusterCell& cell = this->cell(surfel.cell);
+  if (!cell.changed) changed_.push_back(&cell);
+  cell.changed = true;
+  if (!surfel.is_frontier()) {
+    cell.occupied += static_cast<std::uint32_t>(sign);
+    return;
+  }
+  const BlockKey& key = cell.key;
+  cell.frontier += static_cast<std::uint32_t>(sign);
+  cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
+  const int corner[] = {key.x, key.y, key.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
+    cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
+  }
+}
+
+inline void ClusterLattice::change(Kept& before, Kept now) {
+  // Of an occupied surfel only its cell counts.
+  const bool same_cell = before.exists() && before.cell == now.cell;
+  if (!same_cell || before.is_frontier() || now.is_frontier()) {
+    if (before.exists()) count(before, -1);
+    count(now, 1);
+  }
+  before = now;
+}
+
+/// Nullptr if there is none. Those that were asked for before are tried first.
+inline ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
+  auto& [key, recent] = recent_cubes_[std::hash<BlockKey>()(cube) % kRecent];
+  if (recent != nullptr && key == cube) return recent;
+  const auto at = cubes_.find(cube);
+  if (at == cubes_.end()) return nullptr;
+  key = cube;
+  recent = &at->second;
+  return recent;
+}
+
+inline ClusterCell* ClusterLattice::find(const BlockKey& key) {
+  const Cube* cube = find_cube(cube_of(key));
+  const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
+  return number == 0 ? nullptr : &cell(number);
+}
+
 void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
     pages_.clear();
     cubes_.clear();
-    last_cube_ = {{}, nullptr};
+    recent_cubes_ = {};
+    chunks_.clear();
+    unused_.clear();
     changed_.clear();
   }
-  for (const std::uint32_t id : changes.removed) put(id, {});
-  for (const Surfel& s : changes.updated) put(s.id, {s.position, s.normal, s.radius, s.label, nullptr});
+  remove(changes.removed);
+  for (std::size_t n = 0; n < changes.updated.size(); n += kBatch) put(&changes.updated[n], std::min(kBatch, changes.updated.size() - n));
 }
 
 void ClusterLattice::check(const Changes& changes) const {
@@ -48,114 +117,123 @@ void ClusterLattice::check(const Changes& changes) const {
   }
 }
 
-/// Nullptr if no surfel near this id was ever seen.
-ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
-  const std::size_t page = id / kPage;
-  return page < pages_.size() && pages_[page] ? &(*pages_[page])[id % kPage] : nullptr;
+void ClusterLattice::remove(const std::vector<std::uint32_t>& ids) {
+  for (std::size_t n = 0; n < ids.size(); ++n) {
+    // Memory is asked for what comes soon: first the surfel, then its cell.
+    if (n + 2 * kAhead < ids.size()) prefetch(kept(ids[n + 2 * kAhead]));
+    if (n + kAhead < ids.size()) {
+      const Kept* next = kept(ids[n + kAhead]);
+      if (next != nullptr && next->exists()) prefetch(&cell(next->cell));
+    }
+    Kept* before = kept(ids[n]);
+    if (before == nullptr || !before->exists()) continue;
+    count(*before, -1);
+    *before = {};
+  }
 }
 
-void ClusterLattice::put(std::uint32_t id, Kept now) {
-  Kept* before = kept(id);
-  if (before == nullptr) {
-    if (now.radius == 0) return;
-    const std::size_t page = id / kPage;
+/// @param count  at most kBatch
+void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
+  std::array<BlockKey, kBatch> keys;
+  std::array<ClusterCell*, kBatch> cells;
+  for (std::size_t n = 0; n < count; ++n) {
+    prefetch(kept(surfels[n].id));
+    keys[n] = key_of(surfels[n].position);
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    cells[n] = find(keys[n]);
+    prefetch(cells[n]);
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    const Surfel& s = surfels[n];
+    const std::size_t page = s.id / kPage;
     if (page >= pages_.size()) pages_.resize(page + 1);
-    pages_[page] = std::make_unique<Page>();
-    before = kept(id);
+    if (!pages_[page]) pages_[page] = std::make_unique<Page>();
+    Kept& before = *kept(s.id);
+    Kept now = {s.position, s.normal, s.label == Label::kFrontier ? s.radius : -s.radius, 0};
+    if (before.looks_like(now)) continue;
+    now.cell = (cells[n] != nullptr ? *cells[n] : cell_at(keys[n])).number;
+    change(before, now);
   }
-  const bool alike =
-      before->label == now.label && before->radius == now.radius && before->position == now.position && before->normal == now.normal;
-  if (alike) return;
-  const BlockKey key = key_of(now.position);
-  const bool same_cell = before->radius > 0 && before->cell->key == key;
-  if (now.radius > 0) now.cell = same_cell ? before->cell : &cell_at(key);
-  // Of an occupied surfel only its cell counts.
-  if (!same_cell || now.radius == 0 || before->label == Label::kFrontier || now.label == Label::kFrontier) {
-    if (before->radius > 0) count(*before, -1);
-    if (now.radius > 0) count(now, 1);
-  }
-  *before = now;
-}
-
-void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
-  ClusterCell& cell = *surfel.cell;
-  if (!cell.changed) changed_.push_back(&cell);
-  cell.changed = true;
-  if (surfel.label == Label::kOccupied) {
-    cell.occupied += static_cast<std::uint32_t>(sign);
-    return;
-  }
-  const BlockKey& key = cell.key;
-  cell.frontier += static_cast<std::uint32_t>(sign);
-  cell.area += sign * in_units(area_of(surfel.radius), kAreaUnit);
-  const int corner[] = {key.x, key.y, key.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
-    cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
-  }
-}
-
-/// Nullptr if there is none. The last one is tried first.
-ClusterLattice::Cube* ClusterLattice::find_cube(const BlockKey& cube) {
-  if (last_cube_.second != nullptr && last_cube_.first == cube) return last_cube_.second;
-  const auto at = cubes_.find(cube);
-  if (at == cubes_.end()) return nullptr;
-  last_cube_ = {cube, &at->second};
-  return &at->second;
-}
-
-ClusterCell* ClusterLattice::find(const BlockKey& key) {
-  Cube* cube = find_cube(cube_of(key));
-  return cube == nullptr ? nullptr : cube->cells[place_of(key)].get();
 }
 
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
-  Cube* cube = find_cube(cube_of(key));
-  if (cube == nullptr) cube = &cubes_[cube_of(key)];
-  std::unique_ptr<ClusterCell>& cell = cube->cells[place_of(key)];
-  if (!cell) {
-    cell = std::make_unique<ClusterCell>();
-    cell->key = key;
-    ++cube->count;
-    link(*cell);
+  Cube* found = find_cube(cube_of(key));
+  Cube& cube = found != nullptr ? *found : cubes_[cube_of(key)];
+  if (cube.cells[place_of(key)] != 0) return cell(cube.cells[place_of(key)]);
+  const std::uint32_t number = take_number();
+  ClusterCell& added = cell(number);
+  added.key = key;
+  added.number = number;
+  cube.cells[place_of(key)] = number;
+  ++cube.count;
+  link(added);
+  return added;
+}
+
+std::uint32_t ClusterLattice::take_number() {
+  if (unused_.empty()) {
+    const auto first = static_cast<std::uint32_t>(chunks_.size()) * kChunk;
+    chunks_.push_back(std::make_unique<Chunk>());
+    for (std::uint32_t n = kChunk; n-- > 0;)
+      if (first + n > 0) unused_.push_back(first + n);
   }
-  return *cell;
+  const std::uint32_t number = unused_.back();
+  unused_.pop_back();
+  return number;
 }
 
 void ClusterLattice::link(ClusterCell& cell) {
+  BlockKey cube_key = cube_of(cell.key);
+  const Cube* cube = find_cube(cube_key);
   for (int n = 0; n < 26; ++n) {
     const int place = n < 13 ? n : n + 1;  // of 27
-    ClusterCell* other = find({cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1});
-    cell.neighbours[n] = other;
-    if (other != nullptr) other->neighbours[25 - n] = &cell;
+    const BlockKey key = {cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1};
+    if (cube_of(key) != cube_key) {
+      cube_key = cube_of(key);
+      cube = find_cube(cube_key);
+    }
+    const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
+    if (number == 0) continue;
+    ClusterCell& other = this->cell(number);
+    cell.neighbours[n] = &other;
+    other.neighbours[25 - n] = &cell;
   }
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
+  std::vector<std::pair<BlockKey, ClusterCell*>> by_key;  // with the keys, as looking them up takes longer than comparing them
+  by_key.reserve(changed_.size());
+  for (ClusterCell* cell : changed_) {
+    cell->changed = false;
+    by_key.emplace_back(cell->key, cell);
+  }
+  changed_.clear();
+  std::sort(by_key.begin(), by_key.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<ClusterCell*> changed;
-  changed.swap(changed_);
-  std::sort(changed.begin(), changed.end(), [](const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; });
-  for (ClusterCell* cell : changed) cell->changed = false;
+  changed.reserve(by_key.size());
+  for (const auto& [key, cell] : by_key) changed.push_back(cell);
   return changed;
 }
 
 void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
   for (ClusterCell* cell : cells) {
     cell->was_occupied = cell->occupied > 0;
-    if (cell->frontier > 0 || cell->occupied > 0) continue;
-    for (int n = 0; n < 26; ++n)
-      if (cell->neighbours[n] != nullptr) cell->neighbours[n]->neighbours[25 - n] = nullptr;
-    const BlockKey key = cell->key;
-    Cube* cube = find_cube(cube_of(key));
-    cube->cells[place_of(key)].reset();
-    if (--cube->count > 0) continue;
-    last_cube_ = {{}, nullptr};
-    cubes_.erase(cube_of(key));
+    if (cell->frontier == 0 && cell->occupied == 0) forget(*cell);
   }
 }
 
-BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
-  return {round_down(position.x() * per_metre_), round_down(position.y() * per_metre_), round_down(position.z() * per_metre_)};
+void ClusterLattice::forget(ClusterCell& cell) {
+  for (int n = 0; n < 26; ++n)
+    if (cell.neighbours[n] != nullptr) cell.neighbours[n]->neighbours[25 - n] = nullptr;
+  const BlockKey key = cell.key, cube_key = cube_of(key);
+  unused_.push_back(cell.number);
+  cell = {};
+  Cube* cube = find_cube(cube_key);
+  cube->cells[place_of(key)] = 0;
+  if (--cube->count > 0) return;
+  recent_cubes_[std::hash<BlockKey>()(cube_key) % kRecent] = {};
+  cubes_.erase(cube_key);
 }
 
 Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {

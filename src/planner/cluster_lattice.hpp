@@ -13,8 +13,9 @@
 
 namespace frontier_surfels {
 
-/// Sums are whole numbers of small units, so that they do not depend on the order in which surfels came and went.
-struct ClusterCell {
+/// Sums are whole numbers of small units, so that they do not depend on the order in which surfels came and went. What surfels change lies
+/// together, because most of the time goes into fetching cells from memory.
+struct alignas(64) ClusterCell {
   BlockKey key;                                      ///< the cell's lowest corner is this times its edge
   std::int64_t area = 0;                             ///< of the boundary that frontier surfels stand for [kAreaUnit]
   std::array<std::int64_t, 3> position = {0, 0, 0};  ///< sum of frontier surfels' distances from the cell's lowest corner [kLengthUnit]
@@ -23,10 +24,11 @@ struct ClusterCell {
   std::uint32_t occupied = 0;                        ///< surfels
   std::uint32_t cluster = 0;                         ///< id; 0: none
   std::uint32_t mark = 0;                            ///< of the search that is under way
+  std::uint32_t number = 0;                          ///< in the lattice; never 0
+  bool changed = false;                              ///< since take_changed()
+  bool was_occupied = false;                         ///< at the last take_changed()
   /// Cells with surfels that touch this one; null where there is none. Opposite ones have places that add up to 25.
   std::array<ClusterCell*, 26> neighbours = {};
-  bool changed = false;       ///< since take_changed()
-  bool was_occupied = false;  ///< at the last take_changed()
 };
 
 constexpr double kAreaUnit = 1.0 / (std::int64_t{1} << 36);    // [m2]
@@ -59,28 +61,44 @@ class ClusterLattice {
   struct Kept {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-    float radius = 0;  ///< 0: there is no surfel with this id
-    Label label = Label::kFrontier;
-    ClusterCell* cell = nullptr;  ///< that counts it
-  };
-  static constexpr std::size_t kPage = 4096;
-  using Page = std::array<Kept, kPage>;
+    float signed_radius = 0;  ///< [m] negative for occupied surfels; 0: there is no surfel with this id
+    std::uint32_t cell = 0;   ///< number of the cell that counts it
 
-  /// 8^3 cells; most questions after neighbours end in the same cube.
+    bool exists() const { return signed_radius != 0; }
+    bool is_frontier() const { return signed_radius > 0; }
+    bool looks_like(const Kept& other) const {
+      return signed_radius == other.signed_radius && position == other.position && normal == other.normal;
+    }
+  };
+  static constexpr std::size_t kPage = 64;
+  struct alignas(64) Page {
+    std::array<Kept, kPage> surfels;
+  };
+
+  /// Numbers of 8^3 cells, 0 where there is none; most questions after neighbours end in the same cube.
   struct Cube {
-    std::array<std::unique_ptr<ClusterCell>, 512> cells;
+    std::array<std::uint32_t, 512> cells = {};
     int count = 0;
   };
+  static constexpr std::size_t kRecent = 64;  ///< a power of two
+
+  static constexpr std::uint32_t kChunk = 256;
+  using Chunk = std::array<ClusterCell, kChunk>;
   static BlockKey cube_of(const BlockKey& key) { return {key.x >> 3, key.y >> 3, key.z >> 3}; }
   static std::size_t place_of(const BlockKey& key) { return (key.x & 7) << 6 | (key.y & 7) << 3 | (key.z & 7); }
   Cube* find_cube(const BlockKey& cube);
 
   void check(const Changes& changes) const;
   Kept* kept(std::uint32_t id);
-  void put(std::uint32_t id, Kept now);
+  void remove(const std::vector<std::uint32_t>& ids);
+  void put(const Surfel* surfels, std::size_t count);
+  void change(Kept& before, Kept now);
   void count(const Kept& surfel, std::int64_t sign);
+  ClusterCell& cell(std::uint32_t number) { return (*chunks_[number / kChunk])[number % kChunk]; }
   ClusterCell& cell_at(const BlockKey& key);
   ClusterCell* find(const BlockKey& key);
+  std::uint32_t take_number();
+  void forget(ClusterCell& cell);
   void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
@@ -88,7 +106,9 @@ class ClusterLattice {
   double per_metre_;  ///< [cell/m]
   std::vector<std::unique_ptr<Page>> pages_;
   std::unordered_map<BlockKey, Cube> cubes_;
-  std::pair<BlockKey, Cube*> last_cube_ = {{}, nullptr};  ///< of find()
+  std::array<std::pair<BlockKey, Cube*>, kRecent> recent_cubes_ = {};  ///< of find_cube(), by hash; null: none
+  std::vector<std::unique_ptr<Chunk>> chunks_;                         ///< cells by number
+  std::vector<std::uint32_t> unused_;                                  ///< numbers of cells, descending at first
   std::vector<ClusterCell*> changed_;
 };
 

@@ -2,6 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
+#include <cstdlib>
 #include <iterator>
 #include <utility>
 
@@ -27,6 +29,34 @@ void add_contact(std::uint32_t id, std::vector<std::pair<std::uint32_t, int>>& c
 
 bool more_contact(const std::pair<std::uint32_t, int>& a, const std::pair<std::uint32_t, int>& b) {
   return a.second != b.second ? a.second > b.second : a.first < b.first;
+}
+
+/// For each place of a neighbour, a bit for each place next to it.
+std::array<std::uint32_t, 26> places_next_to_each() {
+  const auto along = [](int n, int divisor) { return (n < 13 ? n : n + 1) / divisor % 3; };
+  std::array<std::uint32_t, 26> next = {};
+  for (int a = 0; a < 26; ++a)
+    for (int b = 0; b < 26; ++b) {
+      bool touch = true;
+      for (const int divisor : {9, 3, 1}) touch = touch && std::abs(along(a, divisor) - along(b, divisor)) <= 1;
+      if (touch) next[a] |= 1U << b;
+    }
+  return next;
+}
+
+/// Do the cells of its cluster around this one touch each other without it? Then the cluster does not fall apart if it goes.
+bool can_be_spared(const ClusterCell& cell) {
+  static const std::array<std::uint32_t, 26> kNext = places_next_to_each();
+  std::uint32_t around = 0;
+  for (int n = 0; n < 26; ++n)
+    if (cell.neighbours[n] != nullptr && cell.neighbours[n]->cluster == cell.cluster) around |= 1U << n;
+  std::uint32_t reached = around & (~around + 1), open = reached;  // the lowest bit
+  while (open != 0) {
+    const std::uint32_t more = kNext[__builtin_ctz(open)] & around & ~reached;
+    open = (open & (open - 1)) | more;
+    reached |= more;
+  }
+  return reached == around;
 }
 
 /// Two halves, on both sides of the plane through the mean of the cells across their longest axis.
@@ -57,12 +87,14 @@ std::set<std::uint32_t> ClusterPartition::update(const Cells& changed) {
   visited_ = 0;
   touched_.clear();
   shrunk_.clear();
+  torn_.clear();
 
   const Cells fresh = sort_changes(changed);
   for (const std::uint32_t id : std::set<std::uint32_t>(shrunk_)) count(id);
 
   const Cells alone = join(fresh);
-  for (const std::uint32_t id : shrunk_) divide(id);
+  for (const std::uint32_t id : torn_)
+    if (shrunk_.count(id) > 0) divide(id);
   found(alone);
 
   merge_small();
@@ -72,16 +104,20 @@ std::set<std::uint32_t> ClusterPartition::update(const Cells& changed) {
 /// Takes cells that have no frontier any more out of their clusters. @return cells that have one, but no cluster yet
 ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
   Cells fresh;
+  std::uint32_t last = 0;
+  const auto touch = [&](std::uint32_t id) {  // mostly, cells that follow each other are of the same cluster
+    if (id != 0 && id != last) touched_.insert(id);
+    if (id != 0) last = id;
+  };
   for (ClusterCell* cell : changed) {
     ++visited_;
     if ((cell->occupied > 0) != cell->was_occupied)
-      ClusterLattice::for_neighbours(*cell, [this](const ClusterCell& other) {
-        if (other.cluster != 0) touched_.insert(other.cluster);
-      });
-    if (cell->cluster != 0) touched_.insert(cell->cluster);
+      ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) { touch(other.cluster); });
+    touch(cell->cluster);
     if (cell->frontier > 0 && cell->cluster == 0) fresh.push_back(cell);
     if (cell->frontier == 0 && cell->cluster != 0) {
       shrunk_.insert(cell->cluster);
+      if (!can_be_spared(*cell)) torn_.insert(cell->cluster);
       cell->cluster = 0;
     }
   }
@@ -105,44 +141,58 @@ void ClusterPartition::count(std::uint32_t id) {
 
 /// Gives new cells to clusters next to them, ring by ring. @return those that no cluster has room for
 ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
-  std::set<std::uint32_t> grown;
-  for (bool again = true; again;) {
-    Cells left;
+  std::map<std::uint32_t, std::size_t> grown;  // numbers of cells before, by cluster
+  for (Cells open = fresh; !open.empty();) {
     std::vector<std::pair<ClusterCell*, std::uint32_t>> ring;
-    for (ClusterCell* cell : fresh) {
+    for (ClusterCell* cell : open) {
       ++visited_;
       const std::uint32_t id = neighbour_with_room(*cell);
-      if (id != 0) {
-        groups_.at(id).box.extend(CellBox(cell->key));
-        ring.emplace_back(cell, id);
-      } else {
-        left.push_back(cell);
-      }
+      if (id == 0) continue;
+      groups_.at(id).box.extend(CellBox(cell->key));
+      ring.emplace_back(cell, id);
     }
     // Cells of a ring do not see each other: else those with larger keys would be reached first.
     for (const auto& [cell, id] : ring) {
       cell->cluster = id;
-      groups_.at(id).cells.push_back(cell);
-      grown.insert(id);
+      Cells& cells = groups_.at(id).cells;
+      grown.emplace(id, cells.size());
+      cells.push_back(cell);
     }
-    again = !ring.empty();
-    fresh = std::move(left);
+    open = next_ring(ring);
   }
-  for (const std::uint32_t id : grown) {
+  for (const auto& [id, before] : grown) {
     Cells& cells = groups_.at(id).cells;
-    std::sort(cells.begin(), cells.end(), by_key);
+    const auto added = cells.begin() + static_cast<std::ptrdiff_t>(before);
+    std::sort(added, cells.end(), by_key);
+    std::inplace_merge(cells.begin(), added, cells.end(), by_key);
     touched_.insert(id);
   }
+  fresh.erase(std::remove_if(fresh.begin(), fresh.end(), [](const ClusterCell* cell) { return cell->cluster != 0; }), fresh.end());
   return fresh;
+}
+
+/// Cells without a cluster next to those that have just got one, by key. Others had no room near by and have none now, since clusters grow.
+ClusterPartition::Cells ClusterPartition::next_ring(const std::vector<std::pair<ClusterCell*, std::uint32_t>>& ring) {
+  const std::uint32_t mark = ++mark_;
+  Cells next;
+  for (const auto& [cell, id] : ring)
+    ClusterLattice::for_neighbours(*cell, [&](ClusterCell& other) {
+      if (other.frontier == 0 || other.cluster != 0 || other.mark == mark) return;
+      other.mark = mark;
+      next.push_back(&other);
+    });
+  std::sort(next.begin(), next.end(), by_key);
+  return next;
 }
 
 /// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
 std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
-  Contacts contacts;
+  Contacts& contacts = cell_contacts_;  // kept for its memory
+  contacts.clear();
   ClusterLattice::for_neighbours(cell, [&](const ClusterCell& other) {
     if (other.cluster != 0) add_contact(other.cluster, contacts);
   });
-  std::sort(contacts.begin(), contacts.end(), more_contact);
+  if (contacts.size() > 1) std::sort(contacts.begin(), contacts.end(), more_contact);
   for (const auto& [id, pairs] : contacts) {
     CellBox box = groups_.at(id).box;
     box.extend(CellBox(cell.key));
@@ -256,12 +306,14 @@ std::vector<ClusterPartition::Cells> ClusterPartition::components(const Cells& c
     if (first->mark != mark) continue;
     Cells part = {first};
     first->mark = 0;
-    for (std::size_t next = 0; next < part.size(); ++next)
+    for (std::size_t next = 0; next < part.size(); ++next) {
+      if (part.size() == cells.size()) return {cells};  // all are connected
       ClusterLattice::for_neighbours(*part[next], [&](ClusterCell& other) {
         if (other.mark != mark) return;
         other.mark = 0;
         part.push_back(&other);
       });
+    }
     std::sort(part.begin(), part.end(), by_key);
     parts.push_back(std::move(part));
   }

@@ -49,6 +49,7 @@ class ClusterPartition {
   Cells sort_changes(const Cells& changed);
   Cells join(Cells fresh);
   std::uint32_t neighbour_with_room(const ClusterCell& cell);
+  Cells next_ring(const std::vector<std::pair<ClusterCell*, std::uint32_t>>& ring);
   void divide(std::uint32_t id);
   void found(const Cells& cells);
   void merge_small();
@@ -66,8 +67,10 @@ class ClusterPartition {
   std::uint32_t next_id_ = 1;
   std::uint32_t mark_ = 0;
   std::size_t visited_ = 0;
+  Contacts cell_contacts_;
   std::set<std::uint32_t> touched_;  ///< groups that have changed in this update
   std::set<std::uint32_t> shrunk_;   ///< groups that have lost cells in this update
+  std::set<std::uint32_t> torn_;     ///< those of them that may have fallen apart
 };
 
 }  // namespace frontier_surfels

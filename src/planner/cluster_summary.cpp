@@ -23,30 +23,47 @@ Eigen::Vector3d normal_sum(const ClusterCell& cell) {
 
 BlockKey coarse(const BlockKey& key, int edge) { return {divide_down(key.x, edge), divide_down(key.y, edge), divide_down(key.z, edge)}; }
 
+/// A cell with the mean position of its surfels, world frame [m].
+struct Place {
+  const ClusterCell* cell = nullptr;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+};
+using Places = std::vector<Place>;
+
+/// The cells in cubes of an edge [cell]; none if that makes more than kMostPoints.
+std::map<BlockKey, Places> in_cubes(const Places& places, int edge) {
+  std::map<BlockKey, Places> cubes;
+  auto last = cubes.end();  // cells that follow each other often lie in the same cube
+  for (const Place& place : places) {
+    const BlockKey cube = coarse(place.cell->key, edge);
+    if (last == cubes.end() || last->first != cube) last = cubes.try_emplace(cube).first;
+    last->second.push_back(place);
+    if (cubes.size() > kMostPoints) return {};
+  }
+  return cubes;
+}
+
 /// The cells in cubes, of the smallest size at which there are few enough.
-std::map<BlockKey, Cells> thinned(const Cells& cells) {
-  std::map<BlockKey, Cells> cubes;
-  for (int edge = 1;; ++edge) {
-    cubes.clear();
-    for (ClusterCell* cell : cells) {
-      cubes[coarse(cell->key, edge)].push_back(cell);
-      if (cubes.size() > kMostPoints) break;
-    }
-    if (cubes.size() <= kMostPoints) return cubes;
+std::map<BlockKey, Places> thinned(const Places& places) {
+  int edge = 1;
+  while (kMostPoints * edge * edge * edge < places.size()) ++edge;  // even full cubes would be too many
+  for (;; ++edge) {
+    std::map<BlockKey, Places> cubes = in_cubes(places, edge);
+    if (!cubes.empty()) return cubes;
   }
 }
 
 /// The cell in the middle: the mean of all might lie off the boundary.
-const ClusterCell& middle(const Cells& cells, const ClusterLattice& lattice) {
+const Place& middle(const Places& places) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const ClusterCell* cell : cells) mean += lattice.mean_position(*cell) / static_cast<double>(cells.size());
-  const ClusterCell* nearest = nullptr;
+  for (const Place& place : places) mean += place.position / static_cast<double>(places.size());
+  const Place* nearest = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (const ClusterCell* cell : cells) {
-    const double distance = (lattice.mean_position(*cell) - mean).squaredNorm();
+  for (const Place& place : places) {
+    const double distance = (place.position - mean).squaredNorm();
     if (distance < least) {
       least = distance;
-      nearest = cell;
+      nearest = &place;
     }
   }
   return *nearest;
@@ -67,9 +84,12 @@ Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const Cl
   Cluster cluster;
   cluster.id = id;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+  Places places;
+  places.reserve(group.cells.size());
   for (const ClusterCell* cell : group.cells) {
+    places.push_back({cell, lattice.mean_position(*cell)});
     cluster.surfels += cell->frontier;
-    centroid += lattice.mean_position(*cell) * (static_cast<double>(cell->area) / static_cast<double>(group.area));
+    centroid += places.back().position * (static_cast<double>(cell->area) / static_cast<double>(group.area));
     normal += normal_sum(*cell) / cell->frontier * (static_cast<double>(cell->area) * kAreaUnit);
   }
   cluster.centroid = centroid.cast<float>();
@@ -79,9 +99,9 @@ Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const Cl
     return Eigen::Vector3f((Eigen::Vector3d(key.x + more, key.y + more, key.z + more) * lattice.cell()).cast<float>());
   };
   cluster.box = {corner(group.box.low, 0), corner(group.box.high, 1)};
-  for (const auto& [key, cells] : thinned(group.cells)) {
-    const ClusterCell& cell = middle(cells, lattice);
-    cluster.points.push_back({lattice.mean_position(cell).cast<float>(), unit(normal_sum(cell), cluster.normal)});
+  for (const auto& [key, some] : thinned(places)) {
+    const Place& place = middle(some);
+    cluster.points.push_back({place.position.cast<float>(), unit(normal_sum(*place.cell), cluster.normal)});
   }
   cluster.touches_occupied = near_occupied(group.cells);
   return cluster;

@@ -1,6 +1,8 @@
 /// What a frame has before its stages run: a camera, a map and kept views. Tests make the stages they need themselves.
 #pragma once
 
+#include <limits>
+
 #include "frame/camera.hpp"
 #include "frame/limits.hpp"
 #include "frame/recent_views.hpp"
@@ -32,6 +34,7 @@ class FrameFixture {
   /// Begins a frame, as Mapper does.
   const Frame& begin(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
     camera_ = &cameras_.find(image.intrinsics);
+    map_.log_changes({std::numeric_limits<std::uint64_t>::max()}, 0);  // of this frame alone
     map_.open_window(camera_->grid(), T_world_camera);
     seen_.open_window(map_.window());
     taken_.open_window(map_.window());
@@ -56,7 +59,7 @@ class FrameFixture {
   Changes finish(std::uint32_t frame) {
     map_.finish_frame("test", frame);
     map_.commit(frame);
-    return map_.last_changes();
+    return map_.changes(frame - 1);
   }
   RecentViews& views() { return views_; }
   MapAccess& access() { return access_; }
