@@ -19,6 +19,18 @@ constexpr std::int32_t kFarthest = 1 << 24;                  // blocks from the 
 
 Eigen::Array3i to_cell(const std::array<std::int32_t, 3>& block) { return {block[0], block[1], block[2]}; }
 
+/// Visits the numbers from `low` to `high`, those nearest to `begin` first: upwards, then downwards, each until a visit says that it is
+/// far.
+template <typename Visit>
+void outwards(int begin, int low, int high, const Visit& visit) {
+  if (low > high) return;
+  begin = std::clamp(begin, low, high);
+  for (int n = begin; n <= high && visit(n); ++n) {
+  }
+  for (int n = begin - 1; n >= low && visit(n); --n) {
+  }
+}
+
 }  // namespace
 
 StateGrid::StateGrid(double resolution) : resolution_(resolution), inverse_(1 / resolution) {
@@ -272,38 +284,67 @@ RayState StateGrid::path_state(const Ray& path_world, const Eigen::Vector3f& box
 }
 
 /// The nearest cell that is not free, or is free, within `most` [m] of a point, and its distance; `most` and the point's own cell if there
-/// is none. Rows of cells are asked 16 at a time, nearer ones first.
+/// is none. Nearer blocks go first, and in them nearer rows: what is farther than the best cell so far is left out.
 std::pair<float, StateGrid::Cell> StateGrid::nearest(const Eigen::Vector3f& point, float most, bool free) const {
   Cell own;
   if (!cell_of(point, own)) return {most, Cell::Zero()};
   const Eigen::Array3d p = point.cast<double>().array() * inverse_;
-  const auto to = [&](int axis, int cell) { return std::max({0.0, cell - p[axis], p[axis] - cell - 1}); };  // distance to a layer of cells
   double best = most * inverse_ * (most * inverse_);
   Cell found = own;
+  const auto squared = [&](int axis, int low, int high) {  // distance to the layers of cells from `low` to below `high`
+    const double d = std::max({0.0, low - p[axis], p[axis] - high});
+    return d * d;
+  };
+  const auto visit_row = [&](Row row, int x, int y, int z, double yz2) {  // x: of the row's first cell
+    const int middle = std::clamp(own.x() - x, 0, kEdge - 1);
+    const unsigned above = row >> middle, below = row & ((2U << middle) - 1);
+    const auto take = [&](int cell) {
+      const double d2 = yz2 + squared(0, cell, cell + 1);
+      if (d2 >= best) return;
+      best = d2;
+      found = {cell, y, z};
+    };
+    if (above != 0) take(x + middle + __builtin_ctz(above));
+    if (below != 0) take(x + 31 - __builtin_clz(below));
+  };
+  const auto visit_block = [&](const Cell& block) {
+    const std::uint32_t entry = this->entry(block);
+    const bool mixed = entry >= kFirstMixed;
+    if (!mixed && (entry == static_cast<std::uint32_t>(SpaceState::kFree)) != free) return;
+    const Cell low = block * kEdge, high = low + kEdge - 1;
+    outwards(own.z(), low.z(), high.z(), [&](int z) {
+      const double z2 = squared(2, z, z + 1);
+      if (z2 >= best) return false;
+      const int wide = static_cast<int>(std::sqrt(best - z2)) + 1;
+      outwards(own.y(), std::max(low.y(), own.y() - wide), std::min(high.y(), own.y() + wide), [&](int y) {
+        const Row row = mixed ? cells_[entry - kFirstMixed].free[(z & 15) * kEdge + (y & 15)] : Row{0xffff};
+        const Row wanted = mixed && !free ? static_cast<Row>(~row) : row;
+        if (wanted != 0) visit_row(wanted, low.x(), y, z, z2 + squared(1, y, y + 1));
+        return true;
+      });
+      return true;
+    });
+  };
+  // Beyond the blocks of the directory all is unknown: one layer of them is as good as all.
   const int reach = static_cast<int>(std::min(most * inverse_, 1e6)) + 1;
-  for (int n = 0; n <= 2 * reach; ++n) {
-    const int z = own.z() + (n % 2 == 1 ? (n + 1) / 2 : -n / 2);
-    const double z2 = to(2, z) * to(2, z);
-    if (z2 >= best) continue;
-    for (int m = 0; m <= 2 * reach; ++m) {
-      const int y = own.y() + (m % 2 == 1 ? (m + 1) / 2 : -m / 2);
-      const double yz2 = z2 + to(1, y) * to(1, y);
-      if (yz2 >= best) continue;
-      const int wide = static_cast<int>(std::sqrt(best - yz2)) + 1;
-      for (int block = (own.x() - wide) >> 4; block <= (own.x() + wide) >> 4; ++block) {
-        Row left = row_of({block, y >> 4, z >> 4}, y & 15, z & 15, true);
-        if (!free) left = static_cast<Row>(~left);
-        for (; left != 0; left = static_cast<Row>(left & (left - 1))) {
-          const int x = block * kEdge + __builtin_ctz(left);
-          const double d2 = yz2 + to(0, x) * to(0, x);
-          if (d2 < best) {
-            best = d2;
-            found = {x, y, z};
-          }
-        }
-      }
-    }
-  }
+  const auto to_block = [](int cell) { return cell >> 4; };
+  const Cell first = (own - reach).unaryExpr(to_block).max(low_ - 1), last = (own + reach).unaryExpr(to_block).min(low_ + size_);
+  const auto block_squared = [&](int axis, int block) { return squared(axis, block * kEdge, (block + 1) * kEdge); };
+  outwards(own.z() >> 4, first.z(), last.z(), [&](int z) {
+    const double z2 = block_squared(2, z);
+    if (z2 >= best) return false;
+    outwards(own.y() >> 4, first.y(), last.y(), [&](int y) {
+      const double yz2 = z2 + block_squared(1, y);
+      if (yz2 >= best) return false;
+      outwards(own.x() >> 4, first.x(), last.x(), [&](int x) {
+        if (yz2 + block_squared(0, x) >= best) return false;
+        visit_block({x, y, z});
+        return true;
+      });
+      return true;
+    });
+    return true;
+  });
   return {static_cast<float>(std::sqrt(best) * resolution_), found};
 }
 

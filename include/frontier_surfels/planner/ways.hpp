@@ -11,26 +11,28 @@ namespace frontier_surfels {
 
 /// What a way must be like.
 struct WayOptions {
-  double lattice = 0.2;   ///< [m] between the places that ways lead over. 0.02 to 10
-  double radius = 0.25;   ///< [m] of the ball around the robot that must be free. 0 to 10
-  double lowest = -1e3;   ///< [m] height of the robot's centre, at least ...
-  double highest = 1e3;   ///< [m] ... and at most
-  double own_room = 0.8;  ///< [m] around `been`: what is unknown there counts as free, because no camera sees around itself. 0 to 10
+  double lattice = 0.2;  ///< [m] between the places that ways lead over. 0.02 to 10
+  double radius = 0.25;  ///< [m] of the ball around the robot that must be free. 0 to 10
+  double lowest = -1e3;  ///< [m] height of the robot's centre, at least ...
+  double highest = 1e3;  ///< [m] ... and at most
+  double own_room =
+      0.8;  ///< [m] around `been`, 0 to 10: there the box around the ball may be unknown, because no camera sees around itself
 
   /// Where the robot has been, world frame [m]: its start, and what else it has not looked at from outside.
   std::vector<Eigen::Vector3f> been;
 };
 
-/// The shortest ways from one place to all others, over a lattice with 26 neighbours (Dijkstra). A way is open if the ball is free at each
-/// place of the lattice. The same grid gives the same ways.
+/// The shortest ways from one place to all others, over a lattice with 26 neighbours (Dijkstra). A way is open if the ball is free at its
+/// end and at each place of the lattice on it; also between them, if they are so far apart that the balls do not overlap. The same grid
+/// gives the same ways.
 class Ways {
  public:
   /// @param grid  must outlive this, and stay as it is
   /// @param from  where the robot is, world frame [m]; it can leave that place even if it is not free
-  /// @throws Error  an option is out of range, or `from` is not finite
+  /// @throws Error  an option is out of range, `from` is not finite, or the lattice would have more than 1e8 places
   Ways(const StateGrid& grid, const Eigen::Vector3f& from, const WayOptions& options = {});
 
-  /// Length of the way to a point [m]; infinite: there is none.
+  /// Length of the way to a point [m]; infinite: there is none, or no room for the robot at the point.
   float length(const Eigen::Vector3f& to) const;
 
   /// The corners of the way to a point, both ends included, as few as free space allows; empty: there is none.
@@ -48,6 +50,8 @@ class Ways {
   Eigen::Vector3f position(const Place& place) const { return (place.cast<double>() * options_.lattice).matrix().cast<float>(); }
   bool is_open(const Eigen::Vector3f& p) const;
   bool is_open_between(const Eigen::Vector3f& a, const Eigen::Vector3f& b) const;
+  bool is_step(const Eigen::Vector3f& a, const Eigen::Vector3f& b) const;
+  bool is_first_step(const Eigen::Vector3f& to, bool from_open) const;
   std::ptrdiff_t last_place(const Eigen::Vector3f& to) const;
   void search();
 
