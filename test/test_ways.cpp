@@ -254,12 +254,17 @@ TEST(Ways, KeepToTheirHeights) {
   const Ways low(window, from, options);
   EXPECT_EQ(low.length(to), kNoWay);
   EXPECT_EQ(low.length({-0.5F, 0, 0.6F}), kNoWay);
+  EXPECT_EQ(low.length({-0.5F, 0, 0.46F}), kNoWay) << "a place of the lattice is near, but the point is too high";
   EXPECT_FALSE(low.places().empty());
   for (const Eigen::Vector3f& p : low.places()) EXPECT_TRUE(p.z() > 0.15F && p.z() < 0.45F) << p.transpose();
   options.lowest = options.highest = 0.2F;  // one layer
   const Ways flat(window, from, options);
   EXPECT_NEAR(flat.length({-1, 0, 0.2F}), 0.5F, 1e-5);
   for (const Eigen::Vector3f& p : flat.places()) EXPECT_FLOAT_EQ(p.z(), 0.2F);
+  for (const double height : {-1e300, -5.0, 0.25, 5.0, 1e300}) {  // no place of the lattice is there
+    options.lowest = options.highest = height;
+    EXPECT_TRUE(Ways(window, from, options).places().empty()) << height;
+  }
 }
 
 TEST(Ways, LeaveAClosedPlace) {
@@ -272,7 +277,9 @@ TEST(Ways, LeaveAClosedPlace) {
   const Ways ways(grid, {0, 0, 0.4F}, options);
   expect_same_lengths(ways, slow, extent, {0, 0, 2});
   expect_same_places(ways, slow, {0, 0, 2}, options.lattice);
-  EXPECT_EQ(ways.way({1, 0, 0.4F}).front(), Eigen::Vector3f(0, 0, 0.4F));
+  const std::vector<Eigen::Vector3f> way = ways.way({1, 0, 0.4F});
+  ASSERT_FALSE(way.empty());
+  EXPECT_EQ(way.front(), Eigen::Vector3f(0, 0, 0.4F));
   EXPECT_EQ(Ways(grid, {1, 0, 0.4F}, options).length({0, 0, 0.4F}), kNoWay) << "another robot cannot go there";
 }
 
@@ -318,18 +325,17 @@ TEST(Ways, UnknownMayBeWhereTheRobotHasBeen) {
   EXPECT_GT(more, 200);
 }
 
-/// The ball may touch a wall, wherever the places' coordinates are rounded to.
+/// A corridor as wide as the ball is wide enough, wherever its middle is rounded to.
 TEST(Ways, TouchingIsNoCollision) {
-  CellBox box({0, 0, 0}, {20, 1000, 16});
-  box.fill({0, 0, 0}, {20, 1000, 16}, SpaceState::kFree);
-  box.fill({4, 0, 0}, {7, 1000, 16}, SpaceState::kOccupied);  // x from 0.2 to 0.35 m, and the end of the grid at 1 m
-  const StateGrid grid = box.grid();
-  const Ways ways(grid, {0.6F, 0.4F, 0.4F}, options_of(0.2, 0.25));
-  const Ways both(grid, {0.6F, 0.4F, 0.4F}, options_of(0.2, 0.4));
-  for (int y = 2; y < 248; ++y) {
-    const Eigen::Vector3f p(0.6F, 0.2F * static_cast<float>(y), 0.4F);
-    EXPECT_NEAR(ways.length(p), p.y() - 0.4F, 1e-3) << p.transpose();
-    EXPECT_EQ(both.length(p), y == 2 ? 0 : kNoWay) << p.transpose();
+  const WayOptions options = options_of(0.2, 0.25);
+  for (int y = 2; y < 60; ++y) {
+    CellBox box({0, 4 * y - 8, 0}, {40, 16, 16});
+    box.fill(SpaceState::kOccupied);
+    box.fill({0, 4 * y - 5, 0}, {40, 4 * y + 5, 16}, SpaceState::kFree);
+    const StateGrid grid = box.grid();
+    const Eigen::Vector3f from = SlowWays(box, {2, y, 2}, options, {2, y, 2}, {2, y, 2}).at({2, y, 2});
+    EXPECT_NEAR(Ways(grid, from, options).length(from + Eigen::Vector3f(1.2F, 0, 0)), 1.2F, 1e-5) << from.transpose();
+    EXPECT_EQ(Ways(grid, from, options_of(0.2, 0.252)).length(from + Eigen::Vector3f(1.2F, 0, 0)), kNoWay) << from.transpose();
   }
 }
 

@@ -45,9 +45,9 @@ Ways::Ways(const StateGrid& grid, const Eigen::Vector3f& from, const WayOptions&
     box = {block * Eigen::Vector3d(low[0], low[1], low[2]), block * Eigen::Vector3d(high[0] + 1, high[1] + 1, high[2] + 1)};
   for (const Eigen::Vector3f& place : options.been)
     box.extend(Eigen::AlignedBox3d(place.cast<double>().array() - options.own_room, place.cast<double>().array() + options.own_room));
-  if (box.isEmpty()) return;
   box.min().z() = std::max(box.min().z(), options.lowest);
   box.max().z() = std::min(box.max().z(), options.highest);
+  if (box.isEmpty()) return;
   constexpr double kRounding = 1e-6;
   const Eigen::Array3d first = (box.min().array() / options.lattice - kRounding).ceil(),
                        last = (box.max().array() / options.lattice + kRounding).floor();

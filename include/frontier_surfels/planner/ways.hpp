@@ -14,7 +14,7 @@ struct WayOptions {
   double lattice = 0.2;  ///< [m] between the places that ways lead over. 0.02 to 10
   double radius = 0.25;  ///< [m] of the ball around the robot that must be free. 0 to 10
   double lowest = -1e3;  ///< [m] height of the robot's centre, at least ...
-  double highest = 1e3;  ///< [m] ... and at most
+  double highest = 1e3;  ///< [m] ... and at most; less than a lattice apart, no place may be between them
   double own_room =
       0.8;  ///< [m] around `been`, 0 to 10: there the box around the ball may be unknown, because no camera sees around itself
 
