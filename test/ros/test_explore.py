@@ -43,7 +43,9 @@ class Explore(unittest.TestCase):
         for strategy in STRATEGIES:
             with case(strategy):
                 views = self.views(strategy)
-                self.assertEqual([row['views'] for row in views], list(range(1, VIEWS + 1)), self.output)
+                first = int(views[0]['views'])  # an image is not mapped if the mapper does not know its pose yet
+                self.assertLessEqual(first, 3, self.output)
+                self.assertEqual([row['views'] for row in views], list(range(first, VIEWS + 1)), self.output)
                 for key in ('metres', 'seconds', 'share'):
                     values = [row[key] for row in views]
                     self.assertEqual(values, sorted(values))

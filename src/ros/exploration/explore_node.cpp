@@ -1,9 +1,7 @@
-/// explore: a robot with a depth camera explores an unknown flat. An example of a planner on the mapper's topics and services: start from
-/// it.
-///
-/// The robot looks around once. Then, again and again, it takes views from which frontier can be seen: the viewpoints of ~clusters that it
-/// can reach through free space, and views from where it stands. It asks ~evaluate_views what they show, and takes the view that shows the
-/// most frontier for its way. It ends when no view shows enough. Other strategies are for comparison.
+/// explore: a robot with a depth camera explores an unknown flat. An example of a planner: start from it. The robot looks around once.
+/// Then, again and again, it takes views from which frontier can be seen: the viewpoints of ~clusters that it can reach through free space,
+/// and views from where it stands. It asks ~evaluate_views what they show, and takes the view that shows the most frontier for its way. It
+/// ends when no view shows enough. Other strategies are for comparison.
 #include <frontier_surfels/Coverage.h>
 #include <frontier_surfels/EvaluateViews.h>
 #include <frontier_surfels/FrameReport.h>
@@ -16,7 +14,6 @@
 #include <std_srvs/Trigger.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -24,8 +21,6 @@
 #include <random>
 #include <set>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "frontier_surfels/planner/map_client.hpp"
 #include "frontier_surfels/planner/ways.hpp"
@@ -48,11 +43,7 @@ struct Candidate {
   float value;              ///< frontier that is visible from there [m2]
 };
 
-geometry_msgs::Pose to_pose(const Isometry& T) {
-  Eigen::Isometry3d pose(T.cast<double>());
-  pose.linear() = Eigen::Quaterniond(pose.linear()).normalized().toRotationMatrix();  // of unit length, also for receivers who are strict
-  return messages::to_pose(pose);
-}
+geometry_msgs::Pose to_pose(const Isometry& T) { return messages::to_pose(Eigen::Isometry3d(T.cast<double>())); }
 
 /// The pose of a level camera at `eye` that looks at a point.
 Isometry looking_at(const Vector3f& eye, const Vector3f& target) {
@@ -61,6 +52,11 @@ Isometry looking_at(const Vector3f& eye, const Vector3f& target) {
   T.linear() << x, z.cross(x), z;
   T.translation() = eye;
   return T;
+}
+
+/// The optical frame (z forward, x right) in the body's (x forward, z up).
+Isometry T_body_camera() {
+  return Isometry(Eigen::AngleAxisf(-M_PI / 2, Vector3f::UnitZ()) * Eigen::AngleAxisf(-M_PI / 2, Vector3f::UnitX()));
 }
 
 class Explorer {
@@ -72,20 +68,17 @@ class Explorer {
         view_cost_(pnh.param("view_cost", 1.0)),
         least_value_(pnh.param("least_value", 0.05)),
         range_(pnh.param("range", 3.0)),
+        ways_{0.2, pnh.param("radius", 0.22), pnh.param("lowest", 0.4), pnh.param("highest", 2.1), 0.9, {}},
         log_(log),
         random_(static_cast<unsigned>(pnh.param("seed", 1))) {
-    ways_.radius = pnh.param("radius", 0.22);
-    ways_.lowest = pnh.param("lowest", 0.4);
-    ways_.highest = pnh.param("highest", 2.1);
-    ways_.own_room = 0.9;
     ros::NodeHandle nh;
     const std::string map = strategy == "octomap" ? "octomap_frontiers" : "mapper", camera = "simulated_camera";
     start_again(map + "/reset");
     start_again(camera + "/reset");
     subscribers_ = {nh.subscribe(map + "/states_update", 1000, &Explorer::on_states, this),
-                    nh.subscribe(map + "/clusters", 10, &Explorer::on_clusters, this),
+                    nh.subscribe<FrontierClusterArray>(map + "/clusters", 10, [this](const auto& clusters) { clusters_ = *clusters; }),
                     nh.subscribe(map + "/report", 100, &Explorer::on_report, this),
-                    nh.subscribe(camera + "/coverage", 100, &Explorer::on_coverage, this)};
+                    nh.subscribe<Coverage>(camera + "/coverage", 100, [this](const auto& coverage) { coverage_ = *coverage; })};
     move_ = nh.serviceClient<MoveCamera>(camera + "/move");
     capture_ = nh.serviceClient<std_srvs::Trigger>(camera + "/capture");
     get_state_grid_ = nh.serviceClient<GetStateGrid>(map + "/get_state_grid");
@@ -99,10 +92,7 @@ class Explorer {
       const Ways ways(map_.grid(), here(), ways_);
       const std::optional<Candidate> next = choose(ways);
       decision_ms_ = std::chrono::duration<double, std::milli>(Clock::now() - mapped_).count();
-      if (!next) {
-        ROS_INFO("Nothing that can be reached is left to be seen.");
-        break;
-      }
+      if (!next) break;  // nothing that can be reached is left to be seen
       tried_.insert(key(next->T_world_camera));
       move(ways.way(next->T_world_camera.translation()), next->T_world_camera);
       ways_.been = {start_, here()};
@@ -119,12 +109,10 @@ class Explorer {
     GetStateGrid whole;
     if (get_state_grid_.call(whole)) map_.apply(to_state_changes(whole.response.grid));
   }
-  void on_clusters(const FrontierClusterArray::ConstPtr& clusters) { clusters_ = *clusters; }
-  void on_report(const FrameReport::ConstPtr& report) {
-    report_ = *report;
+  void on_report(const FrameReport& report) {
+    report_ = report;
     mapped_ = Clock::now();
   }
-  void on_coverage(const Coverage::ConstPtr& coverage) { coverage_ = *coverage; }
 
   /// Handles messages until the condition holds. @throws Error  it never did
   template <typename Condition>
@@ -157,17 +145,11 @@ class Explorer {
 
   /// Moves along a way to a pose of the optical frame, where the camera takes an image.
   void move(const std::vector<Vector3f>& way, const Isometry& T_world_camera) {
-    static const Isometry T_body_camera = [] {
-      Isometry T = Isometry::Identity();
-      T.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-      return T;
-    }();
     MoveCamera service;
     for (std::size_t n = 1; n + 1 < way.size(); ++n) service.request.via.push_back(to_point(way[n]));
-    service.request.goal.pose = to_pose(T_world_camera * T_body_camera.inverse());
+    service.request.goal.pose = to_pose(T_world_camera * T_body_camera().inverse());
     if (!move_.call(service) || service.response.stamp.isZero()) throw Error("The camera does not move. " + service.response.message);
-    if (!service.response.success) ROS_DEBUG("%s", service.response.message.c_str());
-    T_world_camera_ = messages::to_isometry(service.response.pose).cast<float>() * T_body_camera;
+    T_world_camera_ = messages::to_isometry(service.response.pose).cast<float>() * T_body_camera();
     wait_for_map(service.response.stamp);
   }
 
@@ -248,11 +230,11 @@ class Explorer {
   void evaluate(std::vector<Candidate>& all) {
     if (all.empty()) return;
     EvaluateViews service;
-    service.request.width = 160;
-    service.request.height = 120;
-    service.request.fx = service.request.fy = 80 / std::tan(29 * M_PI / 180);  // 58 degrees, as a Kinect
-    service.request.cx = 79.5;
-    service.request.cy = 59.5;
+    service.request.width = 120;  // enough to compare views, and quick
+    service.request.height = 90;
+    service.request.fx = service.request.fy = 60 / std::tan(29 * M_PI / 180);  // 58 degrees, as a Kinect
+    service.request.cx = 59.5;
+    service.request.cy = 44.5;
     service.request.range = gaining_range();
     for (const Candidate& candidate : all) service.request.poses.push_back(to_pose(candidate.T_world_camera));
     if (!evaluate_views_.call(service)) throw Error("The map did not evaluate views.");
@@ -281,9 +263,9 @@ class Explorer {
   const std::string strategy_;
   const int most_views_;
   const double view_cost_, least_value_, range_;
+  WayOptions ways_;
   ExplorationLog& log_;
   std::mt19937 random_;
-  WayOptions ways_;
   ros::ServiceClient move_, capture_, get_state_grid_, evaluate_views_, save_map_;
   MapClient map_;
   FrontierClusterArray clusters_;
