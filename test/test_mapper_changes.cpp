@@ -134,6 +134,38 @@ TEST(MapperChange, OfTheLastFrameIsExact) {
   EXPECT_EQ(changes.removed.size(), report.removed);
 }
 
+/// Readers that ask now and then get what one that asks after each frame has got meanwhile, and no more.
+TEST(MapperChange, SinceAReadersLastQuestionAreExact) {
+  struct Reader {
+    std::uint64_t every;
+    Follower follower;
+    std::set<std::uint32_t> touched;  ///< ids that frames have touched since its last question
+  };
+  Mapper mapper(undecimated());
+  std::vector<Reader> readers = {{1, {}, {}}, {2, {}, {}}, {3, {}, {}}, {5, {}, {}}};
+  std::size_t asked = 0;
+  for (const auto& frame : orbit_frames(coarse_camera(), 16, 16)) {
+    mapper.integrate(frame.view());
+    for (Reader& reader : readers) {
+      if (mapper.sequence() % reader.every != 0) continue;
+      const bool first = reader.follower.sequence() == 0;
+      const Changes changes = mapper.changes(reader.follower.sequence());
+      std::set<std::uint32_t> told(changes.removed.begin(), changes.removed.end());
+      for (const Surfel& surfel : changes.updated) told.insert(surfel.id);
+      reader.follower.apply(changes);
+      EXPECT_TRUE(same(reader.follower.surfels(), mapper.surfels())) << "every " << reader.every;
+      if (reader.every == 1) {
+        for (Reader& other : readers) other.touched.insert(told.begin(), told.end());
+      } else if (!first) {
+        EXPECT_TRUE(std::includes(reader.touched.begin(), reader.touched.end(), told.begin(), told.end())) << "every " << reader.every;
+        ++asked;
+      }
+      reader.touched.clear();
+    }
+  }
+  EXPECT_GE(asked, 12u);
+}
+
 /// Number of surfels made by splitting the parent once: with half its radius r, and r / 2 away from its centre.
 std::size_t quarters(const Surfel& parent, const Map& map) {
   return static_cast<std::size_t>(std::count_if(map.begin(), map.end(), [&](const Surfel& s) {

@@ -16,7 +16,7 @@ class ChangeLog {
   using Word = std::uint64_t;
   using Words = std::vector<Word>;
 
-  /// Frame `frame` has changed these slots. Frames come in order; one may come several times.
+  /// Frame `frame` has changed these slots. Frames come in order, also those that have changed nothing; one may come several times.
   /// @param words  one for each page
   void note(std::uint32_t frame, const std::vector<std::uint32_t>& pages, const Words& words);
 
