@@ -219,7 +219,7 @@ class Explorer {
         continue;
       const Vector3f end = here() + way * (1 - kNotFreeAtEnd / distance);
       const Isometry T = looking_at(here(), centroid);
-      if (tried_.count(key(T)) == 0 && map_.grid().ray_state({here(), end}, true).state == SpaceState::kFree)
+      if (tried_.count(key(T)) == 0 && map_.grid().ray_state({here(), end}, false).state != SpaceState::kOccupied)
         all.push_back({T, 0, cluster.area});
     }
   }
