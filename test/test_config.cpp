@@ -256,7 +256,7 @@ TEST(ShippedFiles, EveryConfigurationCanBeUsed) {
     names.insert(entry.path().stem().string());
     EXPECT_EQ(all_problems(load_config(entry.path().string())), "") << entry.path();
   }
-  EXPECT_EQ(names, (std::set<std::string>{"kinect_v1", "mapper", "paper", "realsense_d400", "time_of_flight"}));
+  EXPECT_EQ(names, (std::set<std::string>{"explore", "kinect_v1", "mapper", "paper", "realsense_d400", "time_of_flight"}));
 }
 
 /// Standard deviations at 2 m: of half a step of a Kinect's disparity, of 0.08 pixel of a stereo camera, of time of flight.

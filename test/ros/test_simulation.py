@@ -118,7 +118,7 @@ class Simulation(unittest.TestCase):
         self.image.at(response.stamp)
 
     def test_passes_corners(self):
-        views = self.coverage.messages[-1].views
+        views = self.coverage.at(self.move(goal=goal_of(0.8, 3.95, 1.2)).stamp).views
         response = self.move(via=[Point(8.4, 3.95, 1.2), Point(8.4, 2.6, 1.2)], goal=goal_of(7.4, 2.6, 1.2))
         self.assertTrue(response.success, response.message)
         self.assertAlmostEqual(response.metres, 7.6 + 1.35 + 1, places=6)
@@ -178,7 +178,7 @@ class Simulation(unittest.TestCase):
         self.assertTrue(self.move(goal=goal_of(8.4, 3.95, 1.2)).success)
 
     def test_images_are_taken_on_request(self):
-        views = self.coverage.messages[-1].views
+        views = self.coverage.at(self.move(goal=goal_of(0.8, 3.95, 1.2)).stamp).views
         response = rospy.ServiceProxy(f'{CAMERA}/capture', Trigger)()
         self.assertTrue(response.success)
         self.coverage.find(lambda message: message.views == views + 1)
