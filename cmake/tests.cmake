@@ -91,6 +91,11 @@ if(TARGET frontier_surfels_test_mapper_model)
   target_link_libraries(frontier_surfels_test_mapper_model PRIVATE rapidcheck)
 endif()
 
+if(TARGET frontier_surfels_test_octomap_truth_states)  # makes trees of its own
+  target_include_directories(frontier_surfels_test_octomap_truth_states SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIRS})
+  target_link_libraries(frontier_surfels_test_octomap_truth_states PRIVATE ${OCTOMAP_LIBRARIES})
+endif()
+
 if(TARGET frontier_surfels_test_pcl)
   target_include_directories(frontier_surfels_test_pcl SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
   target_link_libraries(frontier_surfels_test_pcl PRIVATE ${PCL_LIBRARIES} ${PCL_IO_LIBRARY})
