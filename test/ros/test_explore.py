@@ -8,6 +8,8 @@ import subprocess
 import tempfile
 import unittest
 
+from roslib.packages import find_node
+
 from mapper_client import case, run
 
 VIEWS = 16  # of which eight are taken at the start
@@ -65,6 +67,12 @@ class Explore(unittest.TestCase):
             for row in self.views(strategy):
                 with case(f"{strategy}, view {row['views']}"):
                     self.assertTrue(0.2 < row['x'] < 9.8 and 0.2 < row['y'] < 7.8 and 0.39 < row['z'] < 2.11, row)
+
+    def test_an_unknown_strategy_is_refused(self):
+        result = subprocess.run([find_node('frontier_surfels', 'explore')[0], '_strategies:=frontier'], capture_output=True, text=True,
+                                timeout=30)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stdout + result.stderr, "no strategy 'frontier'.*frontiers, octomap, nearest and random")
 
     def test_page(self):
         with open(self.path('explore.json'), encoding='utf-8') as file:

@@ -13,6 +13,12 @@
 
 namespace frontier_surfels {
 
+const std::string& checked_strategy(const std::string& strategy) {
+  for (const char* known : {"frontiers", "octomap", "nearest", "random"})
+    if (strategy == known) return strategy;
+  throw Error("There is no strategy '" + strategy + "': ~strategies may name frontiers, octomap, nearest and random.");
+}
+
 ExplorationLog::ExplorationLog(const std::string& folder) {
   if (folder.empty()) return;
   folder_ = absolute_path(folder);

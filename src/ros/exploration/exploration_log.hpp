@@ -10,6 +10,9 @@
 
 namespace frontier_surfels {
 
+/// @return the same. @throws Error  it is no strategy: frontiers, octomap, nearest or random
+const std::string& checked_strategy(const std::string& strategy);
+
 class ExplorationLog {
  public:
   /// @param folder  gets exploration.csv, a line for each view; is made if it is missing, and loses the pictures of an earlier

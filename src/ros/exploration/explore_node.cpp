@@ -24,6 +24,7 @@
 
 #include "frontier_surfels/planner/map_client.hpp"
 #include "frontier_surfels/planner/ways.hpp"
+#include "ros/exploration/camera_poses.hpp"
 #include "ros/exploration/exploration_log.hpp"
 #include "ros/input/conversions.hpp"
 
@@ -31,10 +32,7 @@ namespace frontier_surfels {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Isometry = Eigen::Isometry3f;
 using Eigen::Vector3f;
-using messages::to_point;
-using messages::to_vector;
 
 /// Something to look at, from somewhere.
 struct Candidate {
@@ -43,27 +41,11 @@ struct Candidate {
   float value;              ///< frontier that is visible from there [m2]
 };
 
-geometry_msgs::Pose to_pose(const Isometry& T) { return messages::to_pose(Eigen::Isometry3d(T.cast<double>())); }
-
-/// The pose of a level camera at `eye` that looks at a point.
-Isometry looking_at(const Vector3f& eye, const Vector3f& target) {
-  const Vector3f z = (target - eye).normalized(), x = z.cross(Vector3f::UnitZ()).normalized();
-  Isometry T = Isometry::Identity();
-  T.linear() << x, z.cross(x), z;
-  T.translation() = eye;
-  return T;
-}
-
-/// The optical frame (z forward, x right) in the body's (x forward, z up).
-Isometry T_body_camera() {
-  return Isometry(Eigen::AngleAxisf(-M_PI / 2, Vector3f::UnitZ()) * Eigen::AngleAxisf(-M_PI / 2, Vector3f::UnitX()));
-}
-
 class Explorer {
  public:
   /// @param strategy  frontiers; octomap: the same, but of OctoMap's voxels; nearest: the nearest viewpoint; random: any free view
   Explorer(const ros::NodeHandle& pnh, const std::string& strategy, ExplorationLog& log)
-      : strategy_(strategy),
+      : strategy_(checked_strategy(strategy)),
         most_views_(pnh.param("most_views", 600)),
         view_cost_(pnh.param("view_cost", 1.0)),
         least_value_(pnh.param("least_value", 0.05)),
@@ -131,6 +113,7 @@ class Explorer {
     if (report_.result != FrameReport::INTEGRATED) ROS_WARN("An image was not mapped: %s", report_.reason.c_str());
     wait("states and clusters", [&] { return map_.grid().sequence() >= report_.sequence && clusters_.sequence >= report_.sequence; });
     wait("the coverage", [&] { return coverage_.header.stamp >= stamp; });
+    if (!ros::ok()) return;  // Ctrl-C: this view does not count
     log_.add(strategy_, coverage_, decision_ms_, here());
     save_map(false);
   }
@@ -146,7 +129,7 @@ class Explorer {
   /// Moves along a way to a pose of the optical frame, where the camera takes an image.
   void move(const std::vector<Vector3f>& way, const Isometry& T_world_camera) {
     MoveCamera service;
-    for (std::size_t n = 1; n + 1 < way.size(); ++n) service.request.via.push_back(to_point(way[n]));
+    for (std::size_t n = 1; n + 1 < way.size(); ++n) service.request.via.push_back(messages::to_point(way[n]));
     service.request.goal.pose = to_pose(T_world_camera * T_body_camera().inverse());
     if (!move_.call(service) || service.response.stamp.isZero()) throw Error("The camera does not move. " + service.response.message);
     T_world_camera_ = messages::to_isometry(service.response.pose).cast<float>() * T_body_camera();
@@ -212,7 +195,7 @@ class Explorer {
   void add_views_from_here(std::vector<Candidate>& all) const {
     constexpr float kNear = 0.3F, kSteepest = 0.8F, kNotFreeAtEnd = 0.1F;
     for (const FrontierCluster& cluster : clusters_.clusters) {
-      const Vector3f centroid = to_vector(cluster.centroid), way = centroid - here();
+      const Vector3f centroid = messages::to_vector(cluster.centroid), way = centroid - here();
       const float distance = way.norm();
       const Vector3f normal = Eigen::Vector3d(cluster.normal.x, cluster.normal.y, cluster.normal.z).cast<float>();
       if (distance < kNear || distance > gaining_range() + 0.2F || std::abs(way.z()) > kSteepest * distance || normal.dot(way) > 0)
@@ -289,9 +272,17 @@ int main(int argc, char** argv) {
   try {
     ExplorationLog log(pnh.param<std::string>("report", ""));
     std::istringstream strategies(pnh.param<std::string>("strategies", "frontiers"));
-    for (std::string strategy; strategies >> strategy && ros::ok();) Explorer(pnh, strategy, log).run();
-    log.finish();
-    return 0;
+    int code = 0;
+    try {
+      for (std::string strategy; strategies >> strategy && ros::ok();) Explorer(pnh, strategy, log).run();
+    } catch (const std::exception& fault) {
+      if (ros::ok()) {  // else it is Ctrl-C that services fail from
+        ROS_FATAL("%s", fault.what());
+        code = 1;
+      }
+    }
+    log.finish();  // what was done is kept
+    return code;
   } catch (const std::exception& fault) {
     ROS_FATAL("%s", fault.what());
     return 1;

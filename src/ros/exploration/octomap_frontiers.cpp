@@ -46,6 +46,7 @@ class OctomapFrontiers {
 
  private:
   void start_again();
+  void report_dropped(const DroppedImage& image);
   bool map_next();
   void map(const CompleteImage& image);
   void push();
@@ -85,7 +86,7 @@ OctomapFrontiers::OctomapFrontiers(const ros::NodeHandle& nh, const ros::NodeHan
               }),
       publisher_(pnh_, config_, [this] { worker_.wake(); }),
       camera_(config_, {"depth/image", "depth/camera_info", ""}, poses_,
-              {[this] { worker_.wake(); }, [](const DroppedImage& image) { ROS_WARN("%s", image.reason.c_str()); }}),
+              {[this] { worker_.wake(); }, [this](const DroppedImage& image) { report_dropped(image); }}),
       services_(pnh_) {
   start_again();
   poses_.start(nh_);
@@ -102,6 +103,15 @@ void OctomapFrontiers::start_again() {
   boundary_.clear();
   is_new_ = true;
   ++sequence_;
+}
+
+/// A planner waits for the report on its image. From any thread.
+void OctomapFrontiers::report_dropped(const DroppedImage& image) {
+  FrameReport report;
+  report.header = image.arrival.image.header();
+  report.result = image.result;
+  report.reason = image.reason;
+  reports_.publish(report);
 }
 
 bool OctomapFrontiers::map_next() {
