@@ -69,7 +69,7 @@ class Explore(unittest.TestCase):
                     self.assertTrue(0.2 < row['x'] < 9.8 and 0.2 < row['y'] < 7.8 and 0.39 < row['z'] < 2.11, row)
 
     def test_an_unknown_strategy_is_refused(self):
-        result = subprocess.run([find_node('frontier_surfels', 'explore')[0], '_strategies:=frontier'], capture_output=True, text=True,
+        result = subprocess.run([find_node('frontier_surfels', 'explore')[0], '__name:=refused', '_strategies:=nearest frontier'], capture_output=True, text=True,
                                 timeout=30)
         self.assertEqual(result.returncode, 1)
         self.assertRegex(result.stdout + result.stderr, "no strategy 'frontier'.*frontiers, octomap, nearest and random")

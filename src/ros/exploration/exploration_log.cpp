@@ -13,10 +13,15 @@
 
 namespace frontier_surfels {
 
-const std::string& checked_strategy(const std::string& strategy) {
-  for (const char* known : {"frontiers", "octomap", "nearest", "random"})
-    if (strategy == known) return strategy;
-  throw Error("There is no strategy '" + strategy + "': ~strategies may name frontiers, octomap, nearest and random.");
+std::vector<std::string> strategies_in(const std::string& text) {
+  std::istringstream words(text);
+  std::vector<std::string> strategies;
+  for (std::string word; words >> word;) {
+    if (word != "frontiers" && word != "octomap" && word != "nearest" && word != "random")
+      throw Error("There is no strategy '" + word + "': ~strategies may name frontiers, octomap, nearest and random.");
+    strategies.push_back(word);
+  }
+  return strategies;
 }
 
 ExplorationLog::ExplorationLog(const std::string& folder) {

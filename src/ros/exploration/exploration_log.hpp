@@ -7,11 +7,12 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace frontier_surfels {
 
-/// @return the same. @throws Error  it is no strategy: frontiers, octomap, nearest or random
-const std::string& checked_strategy(const std::string& strategy);
+/// The strategies in a text with spaces between them. @throws Error  one is none: frontiers, octomap, nearest or random
+std::vector<std::string> strategies_in(const std::string& text);
 
 class ExplorationLog {
  public:

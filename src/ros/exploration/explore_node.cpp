@@ -20,7 +20,6 @@
 #include <optional>
 #include <random>
 #include <set>
-#include <sstream>
 
 #include "frontier_surfels/planner/map_client.hpp"
 #include "frontier_surfels/planner/ways.hpp"
@@ -45,7 +44,7 @@ class Explorer {
  public:
   /// @param strategy  frontiers; octomap: the same, but of OctoMap's voxels; nearest: the nearest viewpoint; random: any free view
   Explorer(const ros::NodeHandle& pnh, const std::string& strategy, ExplorationLog& log)
-      : strategy_(checked_strategy(strategy)),
+      : strategy_(strategy),
         most_views_(pnh.param("most_views", 600)),
         view_cost_(pnh.param("view_cost", 1.0)),
         least_value_(pnh.param("least_value", 0.05)),
@@ -270,11 +269,12 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "explore");
   const ros::NodeHandle nh, pnh("~");
   try {
+    const std::vector<std::string> strategies = strategies_in(pnh.param<std::string>("strategies", "frontiers"));
     ExplorationLog log(pnh.param<std::string>("report", ""));
-    std::istringstream strategies(pnh.param<std::string>("strategies", "frontiers"));
     int code = 0;
     try {
-      for (std::string strategy; strategies >> strategy && ros::ok();) Explorer(pnh, strategy, log).run();
+      for (const std::string& strategy : strategies)
+        if (ros::ok()) Explorer(pnh, strategy, log).run();
     } catch (const std::exception& fault) {
       if (ros::ok()) {  // else it is Ctrl-C that services fail from
         ROS_FATAL("%s", fault.what());
