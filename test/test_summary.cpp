@@ -8,6 +8,7 @@
 #include <memory>
 #include <sstream>
 
+#include "frontier_surfels/map_checksum.hpp"
 #include "replay/progress.hpp"
 #include "replay/summary.hpp"
 #include "replay/sweep.hpp"
@@ -145,7 +146,7 @@ TEST(Summary, HasExactlyTheKeysOfTheInterface) {
   const auto yardsticks = yardsticks_of_a_frame(0.02);
   const ordered_json json = summary_json({"a/folder", {}}, run_of(12), *yardsticks, some_scores());
   EXPECT_EQ(keys(json), (Keys{"input", "version", "date", "world_frame", "warnings", "reasons", "notes", "skipped", "config", "device",
-                              "surfels", "pose_corrections", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
+                              "surfels", "map_checksum", "pose_corrections", "time_ms", "cpu_ms", "memory_mb", "octomap", "exact"}));
   EXPECT_EQ(keys(json["input"]), (Keys{"path", "frames", "skipped"}));
   EXPECT_EQ(keys(json["surfels"]), (Keys{"total", "occupied", "frontier", "taken_back", "map_bytes", "seen_bytes"}));
   EXPECT_EQ(keys(json["pose_corrections"]), (Keys{"shift_mm", "turn_deg"}));
@@ -173,6 +174,7 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_EQ(json["surfels"]["occupied"], 3000);
   EXPECT_EQ(json["surfels"]["map_bytes"], 80000);
   EXPECT_EQ(json["surfels"]["seen_bytes"], 7000);
+  EXPECT_EQ(json["map_checksum"], checksum_text(map_checksum(run_of(12).surfels)));
   // Of frames 0, 1, ... 11, moved by as many mm
   EXPECT_NEAR(json["pose_corrections"]["shift_mm"]["median"], 5.5, 1e-9);
   EXPECT_NEAR(json["pose_corrections"]["shift_mm"]["p95"], 11, 1e-9);

@@ -121,8 +121,9 @@ class Mapper {
   /// Why the map folder could not be written at the last try; empty if all is well. Later frames and flush() try again. From any thread.
   std::string map_folder_fault() const;
 
-  /// What is odd about the map that was opened or loaded, but no reason to refuse it, in sentences: damaged kept views that were left out,
-  /// and a seen_spacing that the map does not have. Each sentence is given once.
+  /// What is odd about the device, or about the map that was opened or loaded, but no reason to refuse it, in sentences: a device that
+  /// cannot give the same map as others, damaged kept views that were left out, and a seen_spacing that the map does not have. Each
+  /// sentence is given once.
   std::vector<std::string> take_warnings();
 
   /// Replaces the map by a saved one; with a map_folder, also the map in the folder. With the same configuration, mapping goes on as with

@@ -11,17 +11,18 @@
 // listed, together (tile_word_index). There columns beyond the grid have words as well, whose bits are 0.
 
 // Edge of voxels at depths z [m].
-INLINE floatv voxel_size(const Grid* g, floatv z) { return fmax(z, g->z_min) / g->f; }
+INLINE floatv voxel_size(const Grid* g, floatv z) { return divided(fmax(z, g->z_min), g->f); }
 
 // F along k: grid coordinates of depths z [m].
 INLINE floatv layers_at(const Grid* g, floatv z) {
-  return z < g->z_min ? z / g->delta_min + (float)g->padding_k : g->f * natural_log(fmax(z, g->z_min) / g->z_min) + g->k_min;
+  return z < g->z_min ? divided(z, g->delta_min) + (float)g->padding_k
+                      : g->f * natural_log(divided(fmax(z, g->z_min), g->z_min)) + g->k_min;
 }
 
 // F: points of the camera frame [m] in grid coordinates.
 INLINE Points to_grid(const Grid* g, Points p) {
   const floatv depth = fmax(p.z, g->z_min);
-  return (Points){p.x * g->fx / depth + g->center_i, p.y * g->fy / depth + g->center_j, layers_at(g, p.z)};
+  return (Points){divided(p.x * g->fx, depth) + g->center_i, divided(p.y * g->fy, depth) + g->center_j, layers_at(g, p.z)};
 }
 
 typedef struct {
@@ -46,8 +47,8 @@ INLINE Points voxel_centers(const Grid* g, __global const float* layer_depth, Vo
   Points p;
   p.z = gather_float(layer_depth, clamp(v.k, 0, g->size_k - 1));
   const floatv depth = convert_floatv(v.k) < g->k_min ? g->z_min : p.z;
-  p.x = (convert_floatv(v.i) - g->center_i) * depth / g->fx;
-  p.y = (convert_floatv(v.j) - g->center_j) * depth / g->fy;
+  p.x = divided((convert_floatv(v.i) - g->center_i) * depth, g->fx);
+  p.y = divided((convert_floatv(v.j) - g->center_j) * depth, g->fy);
   return p;
 }
 

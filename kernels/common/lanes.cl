@@ -11,6 +11,8 @@
 //
 // A list of n entries is handled in chunks of LANES. The last chunk may be filled partly.
 
+// What is computed is the same on every device, bit for bit: a * b + c is rounded twice, here and in all files that follow. See
+// common/arithmetic.cl.
 #pragma OPENCL FP_CONTRACT OFF
 
 // On a CPU without AVX-512, Clang warns that vectors of 16 are passed to functions in another way than with it. Nothing here is linked with
@@ -269,40 +271,3 @@ INLINE intv quotients(intv a, int b) {
   const intv rest = a - q * b;
   return q + MARK(rest < 0) - MARK(rest >= b);
 }
-
-// ln x for normal x > 0, within 2e-7; unlike log() it is the same on every device. x = 2^e m with m around 1, and
-// ln m = 2 artanh((m - 1) / (m + 1)).
-INLINE floatv natural_log(floatv x) {
-  const floatv m = as_floatv(((as_intv(x) - 0x3f3504f3) & 0x007fffff) + 0x3f3504f3);
-  const floatv exponent = convert_floatv((as_intv(x) - 0x3f3504f3) >> 23), s = (m - 1.0f) / (m + 1.0f), q = s * s;
-  return exponent * 0.69314718f + s * (2.0f + q * (0.66666667f + q * (0.4f + q * (0.28571429f + q * 0.22222222f))));
-}
-
-// LANES points or directions.
-typedef struct {
-  floatv x, y, z;
-} Points;
-
-INLINE Points rotated(const Transform* T, Points p) {
-  return (Points){fma(p.x, T->r00, fma(p.y, T->r01, p.z * T->r02)), fma(p.x, T->r10, fma(p.y, T->r11, p.z * T->r12)),
-                  fma(p.x, T->r20, fma(p.y, T->r21, p.z * T->r22))};
-}
-
-INLINE Points transformed(const Transform* T, Points p) {
-  return (Points){fma(p.x, T->r00, fma(p.y, T->r01, fma(p.z, T->r02, T->t0))), fma(p.x, T->r10, fma(p.y, T->r11, fma(p.z, T->r12, T->t1))),
-                  fma(p.x, T->r20, fma(p.y, T->r21, fma(p.z, T->r22, T->t2)))};
-}
-
-INLINE Points scaled(floatv scale, Points p) { return (Points){scale * p.x, scale * p.y, scale * p.z}; }
-
-INLINE Points add_scaled(Points p, floatv scale, Points direction) {
-  return (Points){p.x + scale * direction.x, p.y + scale * direction.y, p.z + scale * direction.z};
-}
-
-INLINE floatv dot_products(Points a, Points b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-INLINE Points cross_products(Points a, Points b) { return (Points){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-
-INLINE floatv lengths(Points p) { return sqrt(dot_products(p, p)); }
-
-INLINE Points normalized(Points p) { return scaled(1.0f / lengths(p), p); }

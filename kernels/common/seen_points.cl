@@ -45,7 +45,7 @@ INLINE intv bricks_at(const SeenPoints* seen, int shift, const SeenPlace* x, con
 //   p: camera frame [m];  asked: marks of the points in question
 intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
   const int shift = f->seen_shift;
-  const float scale = (float)(SEEN_BRICK << shift) / f->window.block_size;
+  const float scale = divided((float)(SEEN_BRICK << shift), f->window.block_size);
   const Points q = transformed(&f->T_local_camera, p);
   const floatv x = q.x * scale - 0.5f, y = q.y * scale - 0.5f, z = q.z * scale - 0.5f;
   const intv i = floor_int(x), j = floor_int(y), k = floor_int(z);
@@ -84,7 +84,7 @@ intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
 INLINE int seen_in_box(const Frame* f, const SeenPoints* seen, const Box* box) {
   const Transform* T = &f->T_local_camera;
   const float3 c = box->center, h = box->half_size;
-  const float scale = (float)(SEEN_BRICK << f->seen_shift) / f->window.block_size;
+  const float scale = divided((float)(SEEN_BRICK << f->seen_shift), f->window.block_size);
   const float3 center = (float3)(T->r00 * c.x + T->r01 * c.y + T->r02 * c.z + T->t0, T->r10 * c.x + T->r11 * c.y + T->r12 * c.z + T->t1,
                                  T->r20 * c.x + T->r21 * c.y + T->r22 * c.z + T->t2);
   const float3 half_size =
@@ -155,7 +155,7 @@ INLINE int cube_in_view(const View* view, __global const ushort* depths, float3 
 }
 
 // Edge of the lattice's cells [m].
-INLINE float seen_spacing(const Window* window, int shift) { return window->block_size / (float)(SEEN_BRICK << shift); }
+INLINE float seen_spacing(const Window* window, int shift) { return divided(window->block_size, (float)(SEEN_BRICK << shift)); }
 
 // LANES points of a word, from bit `bit` on: in the window's frame [m].
 //   first: the word's first point, counted from the window's corner

@@ -18,7 +18,7 @@ INLINE uintv floats_to_halves(floatv x) { return (as_uintv(clamp(x, 6.2e-5f, 650
 INLINE floatv halves_to_floats(uintv bits) { return as_floatv((bits << 13) + (112u << 23)); }
 
 INLINE uintv pack_normals(Points n) {
-  const floatv sum = fabs(n.x) + fabs(n.y) + fabs(n.z), x = n.x / sum, y = n.y / sum;
+  const floatv sum = fabs(n.x) + fabs(n.y) + fabs(n.z), x = divided(n.x, sum), y = divided(n.y, sum);
   const floatv folded_x = x < 0.0f ? fabs(y) - 1.0f : 1.0f - fabs(y), folded_y = y < 0.0f ? fabs(x) - 1.0f : 1.0f - fabs(x);
   const uintv low = as_uintv(floor_int(32767.0f * (n.z < 0.0f ? folded_x : x) + 0.5f)),
               high = as_uintv(floor_int(32767.0f * (n.z < 0.0f ? folded_y : y) + 0.5f));
@@ -45,9 +45,9 @@ typedef struct {
 //   corners: of their blocks, counted in blocks from the window's
 INLINE Surfels unpack_surfels(const Window* window, Quads packed, Points corners) {
   Surfels s;
-  s.position.x = (corners.x + (convert_floatv(packed.x & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
-  s.position.y = (corners.y + (convert_floatv(packed.x >> 16) + 0.5f) / 65536.0f) * window->block_size;
-  s.position.z = (corners.z + (convert_floatv(packed.y & 0xffff) + 0.5f) / 65536.0f) * window->block_size;
+  s.position.x = (corners.x + (convert_floatv(packed.x & 0xffff) + 0.5f) * (1.0f / 65536.0f)) * window->block_size;
+  s.position.y = (corners.y + (convert_floatv(packed.x >> 16) + 0.5f) * (1.0f / 65536.0f)) * window->block_size;
+  s.position.z = (corners.z + (convert_floatv(packed.y & 0xffff) + 0.5f) * (1.0f / 65536.0f)) * window->block_size;
   s.radius = halves_to_floats(packed.y >> 16);
   s.normal = packed.z;
   s.attributes = packed.w;
@@ -72,7 +72,7 @@ INLINE Surfels surfels_at(const Window* window, __global const uint4* surfels, _
 // Surfels as the map keeps them.
 //   p, normal: local frame;   out cell: of the window
 INLINE Quads pack_surfels(const Window* window, Points p, floatv radius, Points normal, uintv attributes, intv* cell) {
-  const floatv x = p.x / window->block_size, y = p.y / window->block_size, z = p.z / window->block_size;
+  const floatv x = divided(p.x, window->block_size), y = divided(p.y, window->block_size), z = divided(p.z, window->block_size);
   const intv block_x = clamp(floor_int(x), 0, window->size_x - 1), block_y = clamp(floor_int(y), 0, window->size_y - 1),
              block_z = clamp(floor_int(z), 0, window->size_z - 1);
   *cell = (block_z * window->size_y + block_y) * window->size_x + block_x;

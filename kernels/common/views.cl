@@ -25,7 +25,7 @@ INLINE floatv view_depths(__global const ushort* depths, intv pixel, float step)
 // Which of LANES points does a view see: its pixel there is valid and lies deeper?
 //   q: column and row times depth, and depth (View);  asked: marks of the points in question
 INLINE intv sees(const View* view, __global const ushort* depths, Points q, intv asked) {
-  const floatv scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
+  const floatv scale = divided(1.0f, q.z), s = q.x * scale, t = q.y * scale;
   const intv seen = asked & MARK((q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height));
   if (!any_lane(seen)) return 0;
   const uintv pixel = view_pixels((uint)view->width, convert_uintv(s), convert_uintv(t));

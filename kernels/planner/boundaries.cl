@@ -13,8 +13,8 @@ typedef struct {
 } Cells;
 
 INLINE Cells cells_of_window(const Window* window, int cells) {
-  const float edge = window->block_size / (float)cells;
-  return (Cells){cells * (int3)(window->size_x, window->size_y, window->size_z), 1.0f / edge, edge};
+  const float edge = divided(window->block_size, (float)cells);
+  return (Cells){cells * (int3)(window->size_x, window->size_y, window->size_z), divided(1.0f, edge), edge};
 }
 
 INLINE int first_cell_of_row(const Cells* cells, int j, int k) { return (k * cells->count.y + j) * cells->count.x; }
@@ -87,7 +87,7 @@ INLINE void look_along_row(const Cells* cells, __global const float4* entries, _
   const float y = distance_to_cells(p.y, j, cells->edge), z = distance_to_cells(p.z, k, cells->edge);
   const float rest = nearest->square - (y * y + z * z);
   if (rest < 0.0f) return;
-  const float width = 1.00001f * sqrt(rest) + 1e-5f;  // more than rounding loses
+  const float width = 1.00001f * square_root(rest) + 1e-5f;  // more than rounding loses
   const int low = max((int)floor((p.x - width) * cells->scale), 0),
             high = min((int)floor((p.x + width) * cells->scale), cells->count.x - 1);
   if (low > high) return;
@@ -168,7 +168,7 @@ __kernel void find_nearest_boundaries(const Window window, const int cells, cons
     const int at = first + m;
     const float3 p = (float3)(points[at], points[stride + at], points[2 * stride + at]);
     nearest = nearest_surfel(&c, entries, cell_begin, p, reach, &nearest);
-    distances[at] = sqrt(nearest.square);
+    distances[at] = square_root(nearest.square);
     slots[at] = nearest.slot;
     if (nearest.slot != UINT_MAX) found[m] = nearest.slot;
   }
@@ -191,7 +191,7 @@ __kernel void find_nearest_in_blocks(const Window window, const float reach, __g
   for (uint at = near_begin[n]; at < near_begin[n + 1] && near_squares[at] <= nearest.square; ++at)
     for (uint m = page_begin[near[at]]; m < page_begin[near[at] + 1]; ++m)
       look_through_page(&window, surfels, alive, page_block, pages[m], p, &nearest);
-  distances[n] = sqrt(nearest.square);
+  distances[n] = square_root(nearest.square);
   slots[n] = nearest.slot;
   const uint found = nearest.slot != UINT_MAX ? nearest.slot : 0;
   store_sides_of_boundaries(surfels_at(&window, surfels, page_block, (uintv)(found)), p, 1, sides + n);
@@ -201,7 +201,7 @@ __kernel void find_nearest_in_blocks(const Window window, const float reach, __g
 INLINE float2 times_within(float low, float high, float from, float way, float half_size) {
   const float begin = low - half_size - from, end = high + half_size - from;
   if (way == 0.0f) return begin <= 0.0f && end >= 0.0f ? (float2)(0.0f, 1.0f) : (float2)(1.0f, 0.0f);
-  const float a = begin / way, b = end / way;
+  const float a = divided(begin, way), b = divided(end, way);
   return (float2)(fmax(fmin(a, b), 0.0f), fmin(fmax(a, b), 1.0f));
 }
 

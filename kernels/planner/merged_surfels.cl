@@ -21,7 +21,7 @@ INLINE uint merged_counter(uint level, uint block, uint blocks) { return (level 
 // How far merged discs of a level may reach out of their block [m]: half the radius is at most half a cell's edge, and the spread 3/2 of
 // it.
 INLINE float merged_reach(uint level, float block_size) {
-  return level == 0 ? 0.0f : 2.01f * block_size / (float)(MERGE_CELLS >> (level - 1));
+  return level == 0 ? 0.0f : divided(2.01f * block_size, (float)(MERGE_CELLS >> (level - 1)));
 }
 
 // The sums of a cell's surfels of one kind.
@@ -50,7 +50,7 @@ INLINE uint merge_cell(const MergeCells* cells, uint x, uint y, uint z) {
 // A cell's edge as a radius of the map: no larger surfel is merged.
 INLINE uint merge_most_radius(float block_size, uint cells) {
   uint halves[LANES];
-  vstorev(floats_to_halves((floatv)(block_size / (float)cells)), 0, halves);
+  vstorev(floats_to_halves((floatv)(divided(block_size, (float)cells))), 0, halves);
   return halves[0];
 }
 
@@ -136,7 +136,7 @@ INLINE void merge_lanes(MergeCells* cells, Quads packed, uint lanes) {
 // is a third of it at the ends of a line and at the corners of a square.
 INLINE float merge_spread(const MergeSum* s) {
   const ulong all = s->squares * s->count, mean = (ulong)s->x * s->x + (ulong)s->y * s->y + (ulong)s->z * s->z;
-  return 3.0f * (float)(all - mean) / ((float)s->count * (float)s->count);
+  return divided(3.0f * (float)(all - mean), (float)s->count * (float)s->count);
 }
 
 // Writes the sums as surfels.
@@ -156,7 +156,7 @@ INLINE void write_merged(const MergeCells* cells, float block_size, __global uin
       n_z[m] = (float)s.n_z;
     }
     const floatv own = halves_to_floats(vloadv(0, radius)),
-                 reach = fmax(own, 0.5f * own + sqrt(vloadv(0, spread)) * (block_size / 65536.0f));
+                 reach = fmax(own, 0.5f * own + square_root(vloadv(0, spread)) * (block_size * (1.0f / 65536.0f)));
     const Points normal = {vloadv(0, n_x), vloadv(0, n_y), vloadv(0, n_z)};
     const Quads packed = {vloadv(0, xy), vloadv(0, zs) | floats_to_halves(reach) << 16, pack_normals(normal), vloadv(0, kind)};
     scatter_quads(packed, (intv)((int)chunk) + lane_numbers(), MARK((int)chunk + lane_numbers() < (int)cells->count), merged);

@@ -99,10 +99,11 @@ __kernel void mark_state_cells(const Window window, const float4 place, const in
   const uint lanes = lanes_of_page(alive[page], first);
   if (lanes == 0) return;
   const Surfels s = load_surfels(&window, surfels, page_block[page], first);
-  const float scale = 1.0f / place.w;
+  const float scale = divided(1.0f, place.w);
   const Points normal = unpack_normals(s.normal);
-  const floatv rx = s.radius * sqrt(fmax(1.0f - normal.x * normal.x, 0.0f)), ry = s.radius * sqrt(fmax(1.0f - normal.y * normal.y, 0.0f)),
-               rz = s.radius * sqrt(fmax(1.0f - normal.z * normal.z, 0.0f));
+  const floatv rx = s.radius * square_root(fmax(1.0f - normal.x * normal.x, 0.0f)),
+               ry = s.radius * square_root(fmax(1.0f - normal.y * normal.y, 0.0f)),
+               rz = s.radius * square_root(fmax(1.0f - normal.z * normal.z, 0.0f));
   const intv x0 = max(floor_int((s.position.x + place.x - rx) * scale), 0), y0 = max(floor_int((s.position.y + place.y - ry) * scale), 0),
              z0 = max(floor_int((s.position.z + place.z - rz) * scale), 0),
              x1 = min(floor_int((s.position.x + place.x + rx) * scale), cells.x - 1),

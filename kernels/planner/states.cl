@@ -87,7 +87,7 @@ __kernel void mark_occupied(const Window window, const float voxels, __global co
   vstorev(s.position.y, 0, y);
   vstorev(s.position.z, 0, z);
   vstorev(voxels * s.radius, 0, reach);
-  const float scale = STATE_CELLS / window.block_size;
+  const float scale = divided((float)STATE_CELLS, window.block_size);
   const int3 last_cell = STATE_CELLS * (int3)(window.size_x, window.size_y, window.size_z) - 1;
   for (uint left = lanes & lane_bits(MARK((s.attributes & SURFEL_OCCUPIED) != 0)); left != 0; left &= left - 1) {
     const int m = lowest_lane(left);

@@ -62,7 +62,7 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
       if (!any_lane(MARK(old > nearest))) continue;
       const intv u = low_u + square_columns(), v = low_v + square_rows();
       const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
-      const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = disc->from_plane / slope;
+      const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = divided(disc->from_plane, slope);
       const floatv x = hit * d_x - disc->x, y = hit * d_y - disc->y, z = hit - disc->z;
       const intv middle = MARK((u == disc->middle_u) & (v == disc->middle_v));
       const floatv depth = depths_within(hit, (floatv)(disc->z_low), (floatv)(disc->z_high));
@@ -92,7 +92,7 @@ typedef struct {
 INLINE void draw_pixel_of_each(const AskedCamera* camera, const ViewDiscs* d, int i, int j, intv marks, __global uint* image, bool shared) {
   const intv u = d->low_u + i, v = d->low_v + j;
   const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
-  const floatv slope = d->n.x * d_x + d->n.y * d_y + d->n.z, hit = d->from_plane / slope;
+  const floatv slope = d->n.x * d_x + d->n.y * d_y + d->n.z, hit = divided(d->from_plane, slope);
   const floatv x = hit * d_x - d->p.x, y = hit * d_y - d->p.y, z = hit - d->p.z;
   const intv middle = MARK((u == d->middle_u) & (v == d->middle_v));
   const floatv depth = depths_within(hit, d->z_low, d->z_high);
@@ -141,16 +141,17 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   lanes &= balls_in_image(camera, p, s.radius);
   if (lanes == 0) return;
   const Points n = rotated(T_camera_local, unpack_normals(s.normal));
-  const floatv reach_z = s.radius * sqrt(fmax(1.0f - n.z * n.z, 0.0f)), near_z = p.z - reach_z;
+  const floatv reach_z = s.radius * square_root(fmax(1.0f - n.z * n.z, 0.0f)), near_z = p.z - reach_z;
   const intv whole = MARK(near_z >= VIEW_NEAR), has_middle = MARK(p.z >= VIEW_NEAR);
   lanes &= lane_bits(MARK((p.z + reach_z >= VIEW_NEAR) & (near_z <= camera->range)));
   if (lanes == 0) return;
 
   // A point q of the disc is off the centre's column by f (q - p) (1, 0, -x / z) / z of q, and off its row alike.
-  const floatv depth = fmax(p.z, VIEW_NEAR), x = p.x / depth, y = p.y / depth, along_x = n.x - x * n.z, along_y = n.y - y * n.z;
-  const floatv scale = s.radius / fmax(near_z, VIEW_NEAR);
-  const floatv reach_u = camera->fx * scale * sqrt(fmax(1.0f + x * x - along_x * along_x, 0.0f)) + 0.01f;
-  const floatv reach_v = camera->fy * scale * sqrt(fmax(1.0f + y * y - along_y * along_y, 0.0f)) + 0.01f;
+  const floatv depth = fmax(p.z, VIEW_NEAR), x = divided(p.x, depth), y = divided(p.y, depth), along_x = n.x - x * n.z,
+               along_y = n.y - y * n.z;
+  const floatv scale = divided(s.radius, fmax(near_z, VIEW_NEAR));
+  const floatv reach_u = camera->fx * scale * square_root(fmax(1.0f + x * x - along_x * along_x, 0.0f)) + 0.01f;
+  const floatv reach_v = camera->fy * scale * square_root(fmax(1.0f + y * y - along_y * along_y, 0.0f)) + 0.01f;
   const floatv u = x * camera->fx + camera->cx, v = y * camera->fy + camera->cy;
   const intv middle_u = floor_int(clamp(u, -1e5f, 1e5f) + 0.5f), middle_v = floor_int(clamp(v, -1e5f, 1e5f) + 0.5f);
   intv low_u, low_v, high_u, high_v;

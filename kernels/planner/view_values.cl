@@ -84,7 +84,7 @@ __kernel void count_views(const AskedCamera camera, __global const AskedView* vi
     const intv empty = MARK(keys == VIEW_NOTHING);
     empty_pixels += empty & exist;
     const floatv z = depths_of_keys(keys);
-    const Points p = {(convert_floatv(u) - camera.cx) / camera.fx * z, ((float)v - camera.cy) / camera.fy * z, z};
+    const Points p = {divided(convert_floatv(u) - camera.cx, camera.fx) * z, divided((float)v - camera.cy, camera.fy) * z, z};
     const Points at = transformed(&view.T_local_camera, p);
     const intv inside = MARK((at.x >= view.box_min[0]) & (at.x <= view.box_max[0]) & (at.y >= view.box_min[1]) & (at.y <= view.box_max[1]) &
                              (at.z >= view.box_min[2]) & (at.z <= view.box_max[2]));
@@ -92,7 +92,7 @@ __kernel void count_views(const AskedCamera camera, __global const AskedView* vi
     const intv frontier = counted & MARK((keys & FRONTIER_PIXEL) != 0), occupied = counted & ~frontier;
     if (!any_lane(counted)) continue;
     const floatv slope = fmax(convert_floatv(keys & (FRONTIER_PIXEL - 1)) * camera.slope_step, VIEW_LEAST_SLOPE);
-    const floatv area = counted ? z * z / slope * VIEW_AREA_ONE : (floatv)(0.0f);
+    const floatv area = counted ? divided(z * z, slope) * VIEW_AREA_ONE : (floatv)(0.0f);
     frontier_area += convert_ulongv(frontier ? area : (floatv)(0.0f));
     occupied_area += convert_ulongv(occupied ? area : (floatv)(0.0f));
     frontier_pixels += frontier;

@@ -16,13 +16,13 @@ INLINE void place_in_view(const Grid* g, const Surfels* s, Points normal, uintv 
   vstorev(c.x, 0, i);
   vstorev(c.y, 0, j);
   vstorev(c.z, 0, k);
-  vstorev(2.0f * s->radius / voxel_size(g, p.z), 0, reach);
+  vstorev(divided(2.0f * s->radius, voxel_size(g, p.z)), 0, reach);
   vstorev(normal.x, 0, n_x);
   vstorev(normal.y, 0, n_y);
   vstorev(normal.z, 0, n_z);
-  vstorev(pyramid ? dot_products(normal, p) / lengths(p) : normal.z, 0, n_k);
-  vstorev(pyramid ? p.x / p.z : 0.0f, 0, ray_x);
-  vstorev(pyramid ? p.y / p.z : 0.0f, 0, ray_y);
+  vstorev(pyramid ? divided(dot_products(normal, p), lengths(p)) : normal.z, 0, n_k);
+  vstorev(pyramid ? divided(p.x, p.z) : 0.0f, 0, ray_x);
+  vstorev(pyramid ? divided(p.y, p.z) : 0.0f, 0, ray_y);
   vstorev(slots, 0, slot);
   vstorev((s->attributes & SURFEL_RAGGED) != 0 ? (uintv)(1) : (uintv)(0), 0, ragged);
   for (int n = 0; n < LANES; ++n)
@@ -46,8 +46,8 @@ __kernel void place_surfels(const Frame f, __global const int4* page_block, __gl
 
 // Half the length, along the functional (a_x, a_y, a_z), of the surfel's ellipsoid e < 1 - supplement B.
 INLINE float ellipsoid_extent(const ViewSurfel* s, float thickness, float3 a) {
-  const float along = dot(a, (float3)(s->n_x, s->n_y, s->n_z));
-  return sqrt(thickness * thickness * along * along + s->reach * s->reach * fmax(dot(a, a) - along * along, 0.0f));
+  const float along = a.x * s->n_x + a.y * s->n_y + a.z * s->n_z, all = a.x * a.x + a.y * a.y + a.z * a.z;
+  return square_root(thickness * thickness * along * along + s->reach * s->reach * fmax(all - along * along, 0.0f));
 }
 
 // The ellipsoid's half lengths along the grid's i, j and k.
@@ -179,8 +179,8 @@ INLINE Footprint make_footprint(const Limits* limits, const ViewSurfel* s, int3 
   f.normal = (float3)(s->n_x, s->n_y, s->n_z);
   f.center = (float3)(s->i, s->j, s->k) - convert_float3(origin);
   f.ray = (float2)(s->ray_x, s->ray_y);
-  f.in_plane = 1.0f / (s->reach * s->reach);
-  f.along = 1.0f / (limits->thickness * limits->thickness) - f.in_plane;
+  f.in_plane = divided(1.0f, s->reach * s->reach);
+  f.along = divided(1.0f, limits->thickness * limits->thickness) - f.in_plane;
   f.step_n = f.ray.x * f.normal.x + f.ray.y * f.normal.y + f.normal.z;
   f.step_step = f.ray.x * f.ray.x + f.ray.y * f.ray.y + 1.0f;
   f.a = f.step_n * f.step_n * f.along + f.step_step * f.in_plane;
@@ -198,7 +198,7 @@ INLINE int2 negative_layers(float a, float b, float c, float center, int first, 
   if (a < 1e-6f) return c < 0.0f ? (int2)(first, last) : (int2)(1, 0);
   const float discriminant = b * b - a * c;
   if (discriminant <= 0.0f) return (int2)(1, 0);
-  const float root = sqrt(discriminant), middle = center - b / a, half_length = root / a;
+  const float root = square_root(discriminant), middle = center - divided(b, a), half_length = divided(root, a);
   return (int2)(max(ceil_int(middle - half_length), first), min(floor_int(middle + half_length), last));
 }
 
@@ -223,7 +223,7 @@ INLINE void add_to_column(__local SignFieldTile* tile, __local const NeededPaths
   for (int k = layers.x; k <= layers.y && (to_i || to_j || to_k); k += 8) {
     const int8 layer = k + (int8)(0, 1, 2, 3, 4, 5, 6, 7);
     const float8 dk = convert_float8(layer) - f->center.z;
-    const float8 e = sqrt(fmax(c + dk * (2.0f * b + dk * f->a), 0.0f));
+    const float8 e = square_root(fmax(c + dk * (2.0f * b + dk * f->a), 0.0f));
     const int8 w = select((int8)(0), convert_int8(fmax(SIGN_FIELD_ONE * (1.0f - e) + 0.5f, 0.0f)), layer <= layers.y);
     if (to_i) accumulate(row_i + k, w * f->sign_i);
     if (to_j) accumulate(row_j + k, w * f->sign_j);

@@ -39,8 +39,8 @@ INLINE void stamp_face(__global uint* face, int width, int height, float2 center
   if (center.x + half_axes.x < 0.0f || center.x - half_axes.x > (float)(width - 1)) return;
   const int last_row = min(floor_int(center.y + half_axes.y), height - 1);
   for (int row = max(ceil_int(center.y - half_axes.y), 0); row <= last_row; ++row) {
-    const float d = ((float)row - center.y) / half_axes.y;
-    const float half_width = half_axes.x * sqrt(fmax(1.0f - d * d, 0.0f));
+    const float d = divided((float)row - center.y, half_axes.y);
+    const float half_width = half_axes.x * square_root(fmax(1.0f - d * d, 0.0f));
     const int last = min(floor_int(center.x + half_width), width - 1);
     __global const uint* needed = lines + row * row_lines;
     for (int column = max(ceil_int(center.x - half_width), 0); column <= last; ++column) {
@@ -72,7 +72,7 @@ INLINE void enter_surfel(const Grid* grid, const Limits* limits, const ViewSurfe
   const uint key_i = face_key(s.i, g.size_i, s.n_x, limits->th_d, s.ragged != 0),
              key_j = face_key(s.j, g.size_j, s.n_y, limits->th_d, s.ragged != 0);
   const uint key_k = face_key(s.k, g.size_k, s.n_k, limits->th_d, s.ragged != 0);
-  const float3 axes = s.reach * sqrt(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
+  const float3 axes = s.reach * square_root(fmax(1.0f - (float3)(s.n_x * s.n_x, s.n_y * s.n_y, s.n_k * s.n_k), 0.0f));
   const float unknown = limits->hull_unknown_scale;
   if (key_i != HULL_EMPTY)
     stamp_face(faces + face_offset(&g, s.i < 0.0f ? FACE_I_LOW : FACE_I_HIGH), g.size_k, g.size_j, (float2)(s.k, s.j),
@@ -100,7 +100,7 @@ __kernel void project_hull(const Frame f, __global const uint* pages, const uint
   Surfels s = load_surfels(&f.window, surfels, page_block[page], first);
   s.position = transformed(&f.T_camera_local, s.position);
   const Voxels at = voxels_at(&f.grid, s.position);
-  const intv reach = convert_intv(2.0f * f.limits.hull_unknown_scale * s.radius * f.grid.f / fmax(s.position.z, f.grid.z_min)) + 2;
+  const intv reach = convert_intv(divided(2.0f * f.limits.hull_unknown_scale * s.radius * f.grid.f, fmax(s.position.z, f.grid.z_min))) + 2;
   const intv near_i = MARK((at.i >= -reach) & (at.i < f.grid.size_i + reach)),
              near_j = MARK((at.j >= -reach) & (at.j < f.grid.size_j + reach)),
              near_k = MARK((at.k >= -reach) & (at.k < f.grid.size_k + reach));

@@ -23,8 +23,8 @@ INLINE MeasuredPoints points_of_pixels(const Grid* g, const TakeBackLimits* limi
   const intv inside = MARK((s < g->width) & (t < g->height));
   const floatv d = gather_float(depth, inside ? t * g->width + s : 0);
   m.measured = inside & MARK(d > 0.0f);
-  m.p.x = (convert_floatv(s + g->padding_i) - g->center_i) * d / g->fx;
-  m.p.y = (convert_floatv(t + g->padding_j) - g->center_j) * d / g->fy;
+  m.p.x = divided((convert_floatv(s + g->padding_i) - g->center_i) * d, g->fx);
+  m.p.y = divided((convert_floatv(t + g->padding_j) - g->center_j) * d, g->fy);
   m.p.z = d;
   m.voxel = voxel_size(g, d);
   m.noise = 3.0f * (limits->noise + limits->noise_growth * d * d) + limits->quantisation * d * d;
@@ -35,7 +35,7 @@ INLINE MeasuredPoints points_of_pixels(const Grid* g, const TakeBackLimits* limi
 //   out q: the points in the view;  s, t: columns and rows
 INLINE intv pixels_in_view(const View* view, Points p, intv asked, Points* q, intv* s, intv* t) {
   *q = transformed(&view->to_image, p);
-  const floatv scale = 1.0f / q->z, x = q->x * scale, y = q->y * scale;
+  const floatv scale = divided(1.0f, q->z), x = q->x * scale, y = q->y * scale;
   const intv inside =
       asked & MARK((q->z > 0.0f) & (x >= 1.0f) & (y >= 1.0f) & (x < (float)(view->width - 1)) & (y < (float)(view->height - 1)));
   *s = inside ? convert_intv(x) : 1;
@@ -106,7 +106,7 @@ INLINE floatv seen_farther(const View* view, __global const ushort* depths, Poin
 // Was the space around points seen before, by `margin` [m]: behind them, and beside them along the image's axes?
 INLINE intv deep_in_seen_space(const Frame* f, const SeenPoints* seen, Points p, floatv margin, intv asked) {
   intv deep = seen_before(f, seen, p, asked);
-  if (any_lane(deep)) deep = seen_before(f, seen, scaled(1.0f + margin / lengths(p), p), deep);
+  if (any_lane(deep)) deep = seen_before(f, seen, scaled(1.0f + divided(margin, lengths(p)), p), deep);
   for (int n = 0; n < 4 && any_lane(deep); ++n) {
     const floatv step = n % 2 == 0 ? margin : -margin;
     const Points beside = {p.x + (n < 2 ? step : 0.0f), p.y + (n < 2 ? 0.0f : step), p.z};
@@ -137,7 +137,7 @@ INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witn
   const floatv strong_margin = fmax(limits->strong_margin * m->voxel, m->noise),
                weak_margin = fmax(limits->weak_margin * m->voxel, m->noise);
   // What was taken back already need not be taken back again.
-  if (f->has_taken) open &= ~seen_before(f, &w->taken, scaled(1.0f + 0.5f * limits->reach * m->voxel / lengths(m->p), m->p), open);
+  if (f->has_taken) open &= ~seen_before(f, &w->taken, scaled(1.0f + divided(0.5f * limits->reach * m->voxel, lengths(m->p)), m->p), open);
 
   // Numbers of opinions: of weak contradictions, strong ones among them, views that agree but are older than the newest contradiction, and
   // newer ones, which may have seen the same thing.

@@ -7,7 +7,7 @@
 INLINE intv behind_chosen(const Grid* g, const TakeBackLimits* limits, const View* own_view, __global const float* depth,
                           __global const uchar* chosen, Points p) {
   const Points q = transformed(&own_view->to_image, p);
-  const floatv scale = 1.0f / q.z, s = q.x * scale, t = q.y * scale;
+  const floatv scale = divided(1.0f, q.z), s = q.x * scale, t = q.y * scale;
   intv behind = MARK((q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)g->width) & (t < (float)g->height));
   if (!any_lane(behind)) return 0;
   const intv pixel = behind ? convert_intv(t) * g->width + convert_intv(s) : 0;

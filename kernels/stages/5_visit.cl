@@ -7,8 +7,8 @@
 //   s: camera frame;  voxel: voxel_size at each of them
 INLINE intv reach_grid(const Grid* g, const Limits* limits, const Surfels* s, floatv voxel) {
   const Points p = s->position;
-  const floatv slope = 1.0f / fmax(p.z, g->z_min);
-  const floatv reach = fmax(2.0f * s->radius / voxel, limits->thickness) + REACH_MARGIN;
+  const floatv slope = divided(1.0f, fmax(p.z, g->z_min));
+  const floatv reach = fmax(divided(2.0f * s->radius, voxel), limits->thickness) + REACH_MARGIN;
   const floatv i = p.x * slope * g->fx + g->center_i, j = p.y * slope * g->fy + g->center_j;
   const floatv reach_i = reach * (1.0f + fabs(p.x * slope)), reach_j = reach * (1.0f + fabs(p.y * slope));
   return MARK((p.z >= -((float)g->padding_k + reach) * voxel) & (p.z <= g->z_max + 2.0f * reach * voxel) & (i > -reach_i) &
@@ -31,7 +31,7 @@ INLINE intv are_seen_through(const Limits* limits, const View* view, __global co
 //   s, normal: camera frame
 INLINE intv are_floating(const Frame* f, const SeenPoints* taken, __global const ushort* depths, const Surfels* s, Points normal,
                          intv asked) {
-  const Points front = add_scaled(s->position, f->limits.front_probe / f->limits.create_radius * s->radius, normal);
+  const Points front = add_scaled(s->position, divided(f->limits.front_probe, f->limits.create_radius) * s->radius, normal);
   const intv floating = seen_before(f, taken, front, asked);
   return any_lane(floating) ? floating & ~own_view_knows(&f->own_view, depths, front, floating) : 0;
 }
@@ -90,7 +90,7 @@ __kernel __attribute__((reqd_work_group_size(PAGE_GROUP, 1, 1))) void visit_surf
     if (found.in_view != 0) {
       const Voxels v = voxels_at(&f.grid, s.position);
       const intv inside = inside_grid(&f.grid, v) & seen;
-      found.large = lane_bits(inside & MARK(s.radius / voxel >= f.limits.split_radius));
+      found.large = lane_bits(inside & MARK(divided(s.radius, voxel) >= f.limits.split_radius));
       const intv bit = half_bits(v.k), candidate = inside ? candidate_halves(&f.grid, v) : 0;
       const intv is_candidate = inside & MARK((gather_int(candidates, candidate) & bit) != 0);
       // Candidates are not observed: only the others are looked up. A voxel that another work item takes off meanwhile is looked up as

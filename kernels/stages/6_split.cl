@@ -5,7 +5,7 @@
 // How many times large surfels must be halved until they are small enough.
 //   z: their depths [m]
 INLINE intv split_levels(const Grid* g, const Limits* limits, floatv z, floatv radius) {
-  floatv r = 0.5f * radius / voxel_size(g, z);  // [voxel]
+  floatv r = divided(0.5f * radius, voxel_size(g, z));  // [voxel]
   intv levels = 1;
   for (int n = 1; n < SPLIT_LEVELS; ++n, r *= 0.5f) levels -= MARK(r >= limits->split_radius);
   return levels;
@@ -42,7 +42,7 @@ __kernel void split(const Frame f, __global const int4* page_block, __global con
   const intv from_x = MARK(fabs(normal.x) < 0.6f);  // any axis that is not near the normal's
   const Points axis = {from_x ? (floatv)(1.0f) : (floatv)(0.0f), from_x ? (floatv)(0.0f) : (floatv)(1.0f), 0.0f};
   const Points x_psi = normalized(cross_products(normal, axis)), y_psi = cross_products(normal, x_psi);
-  const floatv radius = s.radius / convert_floatv(side), spacing = radius * M_SQRT2_F, middle = 0.5f * convert_floatv(side - 1);
+  const floatv radius = divided(s.radius, convert_floatv(side)), spacing = radius * M_SQRT2_F, middle = 0.5f * convert_floatv(side - 1);
 
   intv more = exist;
   for (int child = 0; any_lane(more); ++child) {

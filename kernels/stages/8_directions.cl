@@ -68,9 +68,9 @@ __kernel void find_directions(const Frame f, __global const float* layer_depth, 
       if (!any_lane(is_set)) continue;
       const Points direction = {layer.x[n % 3], layer.y[n / 3], layer.z};
       const floatv distance = lengths(direction);
-      sum.x += is_set ? direction.x / distance : 0.0f;
-      sum.y += is_set ? direction.y / distance : 0.0f;
-      sum.z += is_set ? direction.z / distance : 0.0f;
+      sum.x += is_set ? divided(direction.x, distance) : 0.0f;
+      sum.y += is_set ? divided(direction.y, distance) : 0.0f;
+      sum.z += is_set ? divided(direction.z, distance) : 0.0f;
     }
   }
   vstorev(sum.x, 3 * chunk, directions);

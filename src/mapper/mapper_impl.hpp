@@ -21,6 +21,7 @@
 #include "planner/point_states.hpp"
 #include "planner/state_blocks.hpp"
 #include "planner/view_values.hpp"
+#include "stages/arithmetic_check.hpp"
 #include "stages/candidates.hpp"
 #include "stages/creation.hpp"
 #include "stages/known_space.hpp"
@@ -68,6 +69,7 @@ struct Mapper::Impl {
         boundaries(commands, lists),
         state_blocks(commands),
         view_values(commands) {
+    if (const std::string fault = arithmetic_fault(commands); !fault.empty()) warnings.push_back(fault);
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "opencl/kernel_files.hpp"
+#include "opencl/rounding.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -57,7 +58,7 @@ void retire(const cl::CommandQueue& queue, const Device& device) {
 }  // namespace
 
 std::string build_options(const Device& device) {
-  return "-cl-std=CL1.2 -Werror -DLANES=" + std::to_string(device.lanes) +
+  return std::string("-cl-std=CL1.2 -Werror") + rounding_option(device) + " -DLANES=" + std::to_string(device.lanes) +
          (device.is_cpu ? " -DON_CPU -DSIGN_FIELD_GROUP=1" : " -DSIGN_FIELD_GROUP=64");
 }
 

@@ -92,6 +92,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
     }
   }
   finish_run(source, run);
+  for (std::string& warning : mapper.take_warnings()) run.remarks.push_back(std::move(warning));
   return run;
 }
 

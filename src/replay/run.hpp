@@ -84,7 +84,7 @@ struct Run {
   std::vector<FrameRecord> frames;
   std::vector<std::string> skipped;  ///< a sentence for each frame that was not used
   std::vector<std::string> notes;    ///< see FrameSource
-  std::vector<std::string> remarks;  ///< the warnings of a FrameSource
+  std::vector<std::string> remarks;  ///< the warnings of a FrameSource, and of the mapper
   std::vector<Surfel> surfels;
   Statistics statistics;
   double peak_rss_mb = 0;  ///< [10^6 byte] of the process up to the last frame

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "config/c_locale.hpp"
+#include "frontier_surfels/map_checksum.hpp"
 #include "replay/objects_summary.hpp"
 #include "replay/warnings.hpp"
 
@@ -174,6 +175,7 @@ ordered_json summary_json(const Recording& recording, const Run& run, const Yard
   json["surfels"] = {{"total", run.statistics.surfels},       {"occupied", run.statistics.occupied},
                      {"frontier", run.statistics.frontier},   {"taken_back", taken_back(run.frames)},
                      {"map_bytes", run.statistics.map_bytes}, {"seen_bytes", run.statistics.seen_bytes}};
+  json["map_checksum"] = checksum_text(map_checksum(run.surfels));
   if (run.config.correct_poses) json["pose_corrections"] = corrections_json(run.frames);
   json["time_ms"] = time_json(warm, stage_names(run.frames));
   if (cpu_is_measured(warm)) json["cpu_ms"] = mean_and_median(column(warm, cpu_ms));

@@ -35,7 +35,8 @@ nlohmann::ordered_json exact_json(const scoring::ExactScore& score);
 
 /// The content of summary.json. `octomap`, `exact`, `truth` and `objects` are absent if there are no such scores, `cpu_ms` if the mapper
 /// ran in another process, and `pose_corrections` if there are none. `warnings` are those of warnings(), `reasons` tells how many frames
-/// added nothing for each reason, `notes` are those of the source, and `skipped` has a sentence for each skipped frame.
+/// added nothing for each reason, `map_checksum` is map_checksum() of the surfels, `notes` are those of the source, and `skipped` has a
+/// sentence for each skipped frame.
 nlohmann::ordered_json summary_json(const Recording& recording, const Run& run, const Yardsticks& yardsticks, const Scores& scores);
 
 /// The content of frames.csv: a line for each frame, with numbers that are read back exactly. The column octomap_ms is absent without an
