@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "planner/rounding.hpp"
 
@@ -50,6 +51,14 @@ inline ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
   return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
 }
 
+inline std::int64_t ClusterLattice::area_units(float radius) {
+  if (radius != last_radius_) {
+    last_radius_ = radius;
+    last_area_ = in_units(area_of(radius), kAreaUnit);
+  }
+  return last_area_;
+}
+
 inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
   ClusterCell& cell = this->cell(surfel.cell);
   if (!cell.changed) changed_.push_back(&cell);
@@ -60,7 +69,7 @@ inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
   }
   const BlockKey& key = cell.key;
   cell.frontier += static_cast<std::uint32_t>(sign);
-  cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
+  cell.area += sign * area_units(surfel.signed_radius);
   const int corner[] = {key.x, key.y, key.z};
   for (int axis = 0; axis < 3; ++axis) {
     cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
@@ -141,8 +150,9 @@ void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
     keys[n] = key_of(surfels[n].position);
   }
   for (std::size_t n = 0; n < count; ++n) {
-    cells[n] = find(keys[n]);
-    prefetch(cells[n]);
+    const bool as_before = n > 0 && keys[n] == keys[n - 1];
+    cells[n] = as_before ? cells[n - 1] : find(keys[n]);
+    if (!as_before) prefetch(cells[n]);
   }
   for (std::size_t n = 0; n < count; ++n) {
     const Surfel& s = surfels[n];
@@ -150,7 +160,10 @@ void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
     if (page >= pages_.size()) pages_.resize(page + 1);
     if (!pages_[page]) pages_[page] = std::make_unique<Page>();
     Kept& before = *kept(s.id);
-    Kept now = {s.position, s.normal, s.label == Label::kFrontier ? s.radius : -s.radius, 0};
+    Kept now = {{s.position.x(), s.position.y(), s.position.z()},
+                {s.normal.x(), s.normal.y(), s.normal.z()},
+                s.label == Label::kFrontier ? s.radius : -s.radius,
+                0};
     if (before.looks_like(now)) continue;
     now.cell = (cells[n] != nullptr ? *cells[n] : cell_at(keys[n])).number;
     change(before, now);
@@ -184,16 +197,18 @@ std::uint32_t ClusterLattice::take_number() {
 }
 
 void ClusterLattice::link(ClusterCell& cell) {
-  BlockKey cube_key = cube_of(cell.key);
-  const Cube* cube = find_cube(cube_key);
+  // The cells around lie in up to two cubes along each axis: these are looked up once.
+  const BlockKey low = cube_of({cell.key.x - 1, cell.key.y - 1, cell.key.z - 1});
+  std::array<const Cube*, 8> cubes = {};
+  std::array<bool, 8> known = {};
   for (int n = 0; n < 26; ++n) {
     const int place = n < 13 ? n : n + 1;  // of 27
     const BlockKey key = {cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1};
-    if (cube_of(key) != cube_key) {
-      cube_key = cube_of(key);
-      cube = find_cube(cube_key);
-    }
-    const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
+    const BlockKey cube = cube_of(key);
+    const int index = (cube.x - low.x) * 4 + (cube.y - low.y) * 2 + (cube.z - low.z);
+    if (!known[index]) cubes[index] = find_cube(cube);
+    known[index] = true;
+    const std::uint32_t number = cubes[index] == nullptr ? 0 : cubes[index]->cells[place_of(key)];
     if (number == 0) continue;
     ClusterCell& other = this->cell(number);
     cell.neighbours[n] = &other;
@@ -202,18 +217,8 @@ void ClusterLattice::link(ClusterCell& cell) {
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
-  std::vector<std::pair<BlockKey, ClusterCell*>> by_key;  // with the keys, as looking them up takes longer than comparing them
-  by_key.reserve(changed_.size());
-  for (ClusterCell* cell : changed_) {
-    cell->changed = false;
-    by_key.emplace_back(cell->key, cell);
-  }
-  changed_.clear();
-  std::sort(by_key.begin(), by_key.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<ClusterCell*> changed;
-  changed.reserve(by_key.size());
-  for (const auto& [key, cell] : by_key) changed.push_back(cell);
-  return changed;
+  for (ClusterCell* cell : changed_) cell->changed = false;
+  return std::exchange(changed_, {});
 }
 
 void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
@@ -234,12 +239,6 @@ void ClusterLattice::forget(ClusterCell& cell) {
   if (--cube->count > 0) return;
   recent_cubes_[std::hash<BlockKey>()(cube_key) % kRecent] = {};
   cubes_.erase(cube_key);
-}
-
-Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {
-  const Eigen::Vector3d corner = Eigen::Vector3d(cell.key.x, cell.key.y, cell.key.z) * cell_;
-  const Eigen::Vector3d sum(cell.position[0], cell.position[1], cell.position[2]);
-  return corner + sum * (kLengthUnit / std::max(1U, cell.frontier));
 }
 
 }  // namespace frontier_surfels

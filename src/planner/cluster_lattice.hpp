@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <unordered_map>
@@ -42,7 +43,7 @@ class ClusterLattice {
   /// @throws Error  a surfel cannot be used; nothing has changed
   void apply(const Changes& changes);
 
-  /// Cells that differ from those at the last call, by key. Those without surfels are to be given to forget_empty().
+  /// Cells that differ from those at the last call, in no certain order. All are to be given to forget_empty().
   std::vector<ClusterCell*> take_changed();
   void forget_empty(const std::vector<ClusterCell*>& cells);
 
@@ -54,15 +55,20 @@ class ClusterLattice {
   }
 
   double cell() const { return cell_; }
-  Eigen::Vector3d mean_position(const ClusterCell& cell) const;  ///< of its frontier surfels, world frame [m]
+
+  /// Of a cell's frontier surfels, world frame [m].
+  Eigen::Vector3d mean_position(const ClusterCell& cell) const {
+    const Eigen::Vector3d corner = Eigen::Vector3d(cell.key.x, cell.key.y, cell.key.z) * cell_;
+    const Eigen::Vector3d sum(cell.position[0], cell.position[1], cell.position[2]);
+    return corner + sum * (kLengthUnit / std::max(1U, cell.frontier));
+  }
 
  private:
-  /// What is kept of a surfel, to tell what changes.
+  /// What is kept of a surfel, to tell what changes. All zeros: there is no surfel with this id.
   struct Kept {
-    Eigen::Vector3f position = Eigen::Vector3f::Zero();
-    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-    float signed_radius = 0;  ///< [m] negative for occupied surfels; 0: there is no surfel with this id
-    std::uint32_t cell = 0;   ///< number of the cell that counts it
+    std::array<float, 3> position, normal;
+    float signed_radius;  ///< [m] negative for occupied surfels
+    std::uint32_t cell;   ///< number of the cell that counts it
 
     bool exists() const { return signed_radius != 0; }
     bool is_frontier() const { return signed_radius > 0; }
@@ -94,6 +100,7 @@ class ClusterLattice {
   void put(const Surfel* surfels, std::size_t count);
   void change(Kept& before, Kept now);
   void count(const Kept& surfel, std::int64_t sign);
+  std::int64_t area_units(float radius);
   ClusterCell& cell(std::uint32_t number) { return (*chunks_[number / kChunk])[number % kChunk]; }
   ClusterCell& cell_at(const BlockKey& key);
   ClusterCell* find(const BlockKey& key);
@@ -110,6 +117,8 @@ class ClusterLattice {
   std::vector<std::unique_ptr<Chunk>> chunks_;                         ///< cells by number
   std::vector<std::uint32_t> unused_;                                  ///< numbers of cells, descending at first
   std::vector<ClusterCell*> changed_;
+  float last_radius_ = 0;  ///< [m] of area_units(), which asks for the same again and again
+  std::int64_t last_area_ = 0;
 };
 
 }  // namespace frontier_surfels
