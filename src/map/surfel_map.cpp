@@ -277,6 +277,13 @@ Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
     for_each_bit(changed & known & ~alive[page], [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
   }
   changes.updated.reserve(slots.size());
+  if (commands_.device().is_cpu && !slots.empty()) {  // its memory is the host's, who reads the surfels where they are
+    const std::size_t bytes = PAGE_SLOTS * index_.end() * sizeof(cl_uint4);
+    void* surfels = commands_.queue().enqueueMapBuffer(surfels_(), CL_TRUE, CL_MAP_READ, 0, bytes);
+    unpack_slots(static_cast<const cl_uint4*>(surfels), slots, blocks, block_size_, changes.updated);
+    commands_.queue().enqueueUnmapMemObject(surfels_(), surfels);
+    return changes;
+  }
   DeviceArray<cl_uint> list(commands_);
   DeviceArray<cl_uint4> gathered(commands_);
   list.allocate(std::min(slots.size(), kGatheredSurfels));
@@ -285,7 +292,7 @@ Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
     const std::vector<cl_uint> some(slots.begin() + begin, slots.begin() + std::min(begin + kGatheredSurfels, slots.size()));
     list.write(some);
     commands_.run("changes", "gather_surfels", some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(), gathered());
-    unpack_slots(gathered.read(some.size()), some, blocks, block_size_, changes.updated);
+    unpack_gathered(gathered.read(some.size()), some, blocks, block_size_, changes.updated);
   }
   return changes;
 }

@@ -37,7 +37,8 @@ Eigen::Vector3f unpack_normal(std::uint32_t bits) {
   const float over = std::max(-n.z(), 0.0F);
   n.x() -= std::copysign(over, n.x());  // a branch on the sign would be guessed wrongly every other time
   n.y() -= std::copysign(over, n.y());
-  return n.normalized();
+  const Eigen::Array4f padded(n.x(), n.y(), n.z(), 0);  // divided all at once
+  return (padded / n.norm()).head<3>();
 }
 
 /// Calls of public functions within a shared library go through a table; this one is inlined.
@@ -51,6 +52,13 @@ inline Surfel unpack_inline(const cl_uint4& packed, const BlockKey& block, doubl
   surfel.label = attributes & SURFEL_OCCUPIED ? Label::kOccupied : Label::kFrontier;
   for (int channel = 0; channel < 3; ++channel) surfel.rgb[channel] = static_cast<std::uint8_t>(attributes >> (8 * channel));
   return surfel;
+}
+
+inline void unpack_slot(const cl_uint4& packed, cl_uint slot, const std::vector<cl_int4>& page_block, double block_size,
+                        std::vector<Surfel>& to) {
+  const auto& block = page_block[slot / PAGE_SLOTS].s;
+  to.push_back(unpack_inline(packed, {block[0], block[1], block[2]}, block_size));
+  to.back().id = slot;
 }
 
 }  // namespace
@@ -72,13 +80,14 @@ cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size) {
 
 Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) { return unpack_inline(packed, block, block_size); }
 
-void unpack_slots(const std::vector<cl_uint4>& packed, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block,
-                  double block_size, std::vector<Surfel>& to) {
-  for (std::size_t n = 0; n < slots.size(); ++n) {
-    const auto& block = page_block[slots[n] / PAGE_SLOTS].s;
-    to.push_back(unpack_inline(packed[n], {block[0], block[1], block[2]}, block_size));
-    to.back().id = slots[n];
-  }
+void unpack_gathered(const std::vector<cl_uint4>& packed, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block,
+                     double block_size, std::vector<Surfel>& to) {
+  for (std::size_t n = 0; n < slots.size(); ++n) unpack_slot(packed[n], slots[n], page_block, block_size, to);
+}
+
+void unpack_slots(const cl_uint4* surfels, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block, double block_size,
+                  std::vector<Surfel>& to) {
+  for (const cl_uint slot : slots) unpack_slot(surfels[slot], slot, page_block, block_size, to);
 }
 
 std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes) {

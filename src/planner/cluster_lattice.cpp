@@ -11,7 +11,6 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kAhead = 16;    // surfels between asking for memory and using it
-constexpr std::size_t kBatch = 64;    // surfels
 constexpr float kFarthest = 1e6F;     // [m] nothing is mapped beyond
 constexpr float kLargestRadius = 10;  // [m]
 
@@ -46,45 +45,38 @@ inline BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
 }
 
 /// Nullptr if no surfel near this id was ever seen.
-inline ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
+inline ClusterLattice::Page* ClusterLattice::page_of(std::uint32_t id) {
   const std::size_t page = id / kPage;
-  return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
+  return page < pages_.size() ? pages_[page].get() : nullptr;
 }
 
-inline std::int64_t ClusterLattice::area_units(float radius) {
-  if (radius != last_radius_) {
-    last_radius_ = radius;
-    last_area_ = in_units(area_of(radius), kAreaUnit);
-  }
-  return last_area_;
+/// Nullptr if there is no surfel with this id.
+inline ClusterLattice::Kept* ClusterLattice::kept(Page* page, std::uint32_t id) {
+  return page != nullptr && (page->exists >> id % kPage & 1) != 0 ? &page->surfels[id % kPage] : nullptr;
 }
 
-inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
-  ClusterCell& cell = this->cell(surfel.cell);
+/// Counts a surfel of a cell once more (1) or once less (-1).
+inline void ClusterLattice::count(ClusterCell& cell, const Kept& surfel, std::int64_t sign) {
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (!surfel.is_frontier()) {
     cell.occupied += static_cast<std::uint32_t>(sign);
     return;
   }
-  const BlockKey& key = cell.key;
   cell.frontier += static_cast<std::uint32_t>(sign);
-  cell.area += sign * area_units(surfel.signed_radius);
-  const int corner[] = {key.x, key.y, key.z};
+  cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
+  const std::array<double, 3> corner = {cell.key.x * cell_, cell.key.y * cell_, cell.key.z * cell_};
   for (int axis = 0; axis < 3; ++axis) {
-    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
+    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis], kLengthUnit);
     cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
   }
 }
 
-inline void ClusterLattice::change(Kept& before, Kept now) {
-  // Of an occupied surfel only its cell counts.
-  const bool same_cell = before.exists() && before.cell == now.cell;
-  if (!same_cell || before.is_frontier() || now.is_frontier()) {
-    if (before.exists()) count(before, -1);
-    count(now, 1);
-  }
-  before = now;
+/// @param cell  that `now` lies in
+inline void ClusterLattice::change(const Kept& before, const Kept& now, ClusterCell& cell) {
+  if (before.cell == now.cell && !before.is_frontier() && !now.is_frontier()) return;  // of an occupied surfel only its cell counts
+  count(this->cell(before.cell), before, -1);
+  count(cell, now, 1);
 }
 
 /// Nullptr if there is none. Those that were asked for before are tried first.
@@ -129,44 +121,51 @@ void ClusterLattice::check(const Changes& changes) const {
 void ClusterLattice::remove(const std::vector<std::uint32_t>& ids) {
   for (std::size_t n = 0; n < ids.size(); ++n) {
     // Memory is asked for what comes soon: first the surfel, then its cell.
-    if (n + 2 * kAhead < ids.size()) prefetch(kept(ids[n + 2 * kAhead]));
+    if (n + 2 * kAhead < ids.size())
+      if (Page* page = page_of(ids[n + 2 * kAhead])) prefetch(&page->surfels[ids[n + 2 * kAhead] % kPage]);
     if (n + kAhead < ids.size()) {
-      const Kept* next = kept(ids[n + kAhead]);
-      if (next != nullptr && next->exists()) prefetch(&cell(next->cell));
+      const Kept* next = kept(page_of(ids[n + kAhead]), ids[n + kAhead]);
+      if (next != nullptr) prefetch(&cell(next->cell));
     }
-    Kept* before = kept(ids[n]);
-    if (before == nullptr || !before->exists()) continue;
-    count(*before, -1);
-    *before = {};
+    Page* page = page_of(ids[n]);
+    const Kept* before = kept(page, ids[n]);
+    if (before == nullptr) continue;
+    count(cell(before->cell), *before, -1);
+    page->exists &= ~(std::uint64_t{1} << ids[n] % kPage);
   }
 }
 
 /// @param count  at most kBatch
 void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
-  std::array<BlockKey, kBatch> keys;
   std::array<ClusterCell*, kBatch> cells;
   for (std::size_t n = 0; n < count; ++n) {
-    prefetch(kept(surfels[n].id));
-    keys[n] = key_of(surfels[n].position);
+    if (Page* page = page_of(surfels[n].id)) prefetch(&page->surfels[surfels[n].id % kPage]);
+    keys_[n] = key_of(surfels[n].position);
   }
   for (std::size_t n = 0; n < count; ++n) {
-    const bool as_before = n > 0 && keys[n] == keys[n - 1];
-    cells[n] = as_before ? cells[n - 1] : find(keys[n]);
+    const bool as_before = n > 0 && keys_[n] == keys_[n - 1];
+    cells[n] = as_before ? cells[n - 1] : find(keys_[n]);
     if (!as_before) prefetch(cells[n]);
   }
   for (std::size_t n = 0; n < count; ++n) {
     const Surfel& s = surfels[n];
-    const std::size_t page = s.id / kPage;
-    if (page >= pages_.size()) pages_.resize(page + 1);
-    if (!pages_[page]) pages_[page] = std::make_unique<Page>();
-    Kept& before = *kept(s.id);
+    if (s.id / kPage >= pages_.size()) pages_.resize(s.id / kPage + 1);
+    std::unique_ptr<Page>& page = pages_[s.id / kPage];
+    if (!page) page = std::make_unique<Page>();
     Kept now = {{s.position.x(), s.position.y(), s.position.z()},
                 {s.normal.x(), s.normal.y(), s.normal.z()},
                 s.label == Label::kFrontier ? s.radius : -s.radius,
                 0};
-    if (before.looks_like(now)) continue;
-    now.cell = (cells[n] != nullptr ? *cells[n] : cell_at(keys[n])).number;
-    change(before, now);
+    const Kept* before = kept(page.get(), s.id);
+    if (before != nullptr && before->looks_like(now)) continue;
+    ClusterCell& cell = cells[n] != nullptr ? *cells[n] : cell_at(keys_[n]);
+    now.cell = cell.number;
+    if (before != nullptr)
+      change(*before, now, cell);
+    else
+      this->count(cell, now, 1);
+    page->surfels[s.id % kPage] = now;
+    page->exists |= std::uint64_t{1} << s.id % kPage;
   }
 }
 
@@ -201,19 +200,24 @@ void ClusterLattice::link(ClusterCell& cell) {
   const BlockKey low = cube_of({cell.key.x - 1, cell.key.y - 1, cell.key.z - 1});
   std::array<const Cube*, 8> cubes = {};
   std::array<bool, 8> known = {};
-  for (int n = 0; n < 26; ++n) {
-    const int place = n < 13 ? n : n + 1;  // of 27
-    const BlockKey key = {cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1};
-    const BlockKey cube = cube_of(key);
-    const int index = (cube.x - low.x) * 4 + (cube.y - low.y) * 2 + (cube.z - low.z);
-    if (!known[index]) cubes[index] = find_cube(cube);
-    known[index] = true;
-    const std::uint32_t number = cubes[index] == nullptr ? 0 : cubes[index]->cells[place_of(key)];
-    if (number == 0) continue;
-    ClusterCell& other = this->cell(number);
-    cell.neighbours[n] = &other;
-    other.neighbours[25 - n] = &cell;
-  }
+  BlockKey key;
+  int n = 0;
+  for (key.x = cell.key.x - 1; key.x <= cell.key.x + 1; ++key.x)
+    for (key.y = cell.key.y - 1; key.y <= cell.key.y + 1; ++key.y)
+      for (key.z = cell.key.z - 1; key.z <= cell.key.z + 1; ++key.z) {
+        if (key == cell.key) continue;
+        const BlockKey cube = cube_of(key);
+        const int index = (cube.x - low.x) * 4 + (cube.y - low.y) * 2 + (cube.z - low.z);
+        if (!known[index]) cubes[index] = find_cube(cube);
+        known[index] = true;
+        const std::uint32_t number = cubes[index] == nullptr ? 0 : cubes[index]->cells[place_of(key)];
+        if (number != 0) {
+          ClusterCell& other = this->cell(number);
+          cell.neighbours[n] = &other;
+          other.neighbours[25 - n] = &cell;
+        }
+        ++n;
+      }
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {

@@ -64,13 +64,12 @@ class ClusterLattice {
   }
 
  private:
-  /// What is kept of a surfel, to tell what changes. All zeros: there is no surfel with this id.
+  /// What is kept of a surfel, to tell what changes.
   struct Kept {
     std::array<float, 3> position, normal;
     float signed_radius;  ///< [m] negative for occupied surfels
     std::uint32_t cell;   ///< number of the cell that counts it
 
-    bool exists() const { return signed_radius != 0; }
     bool is_frontier() const { return signed_radius > 0; }
     bool looks_like(const Kept& other) const {
       return signed_radius == other.signed_radius && position == other.position && normal == other.normal;
@@ -78,7 +77,9 @@ class ClusterLattice {
   };
   static constexpr std::size_t kPage = 64;
   struct alignas(64) Page {
+    Page() {}  // filling the surfels would take longer than all that is done with them
     std::array<Kept, kPage> surfels;
+    std::uint64_t exists = 0;  ///< a bit for each surfel that there is; the others are not filled in
   };
 
   /// Numbers of 8^3 cells, 0 where there is none; most questions after neighbours end in the same cube.
@@ -86,6 +87,7 @@ class ClusterLattice {
     std::array<std::uint32_t, 512> cells = {};
     int count = 0;
   };
+  static constexpr std::size_t kBatch = 64;   ///< surfels that are put at a time
   static constexpr std::size_t kRecent = 64;  ///< a power of two
 
   static constexpr std::uint32_t kChunk = 256;
@@ -95,12 +97,12 @@ class ClusterLattice {
   Cube* find_cube(const BlockKey& cube);
 
   void check(const Changes& changes) const;
-  Kept* kept(std::uint32_t id);
+  Page* page_of(std::uint32_t id);
+  static Kept* kept(Page* page, std::uint32_t id);
   void remove(const std::vector<std::uint32_t>& ids);
   void put(const Surfel* surfels, std::size_t count);
-  void change(Kept& before, Kept now);
-  void count(const Kept& surfel, std::int64_t sign);
-  std::int64_t area_units(float radius);
+  void change(const Kept& before, const Kept& now, ClusterCell& cell);
+  void count(ClusterCell& cell, const Kept& surfel, std::int64_t sign);
   ClusterCell& cell(std::uint32_t number) { return (*chunks_[number / kChunk])[number % kChunk]; }
   ClusterCell& cell_at(const BlockKey& key);
   ClusterCell* find(const BlockKey& key);
@@ -117,8 +119,7 @@ class ClusterLattice {
   std::vector<std::unique_ptr<Chunk>> chunks_;                         ///< cells by number
   std::vector<std::uint32_t> unused_;                                  ///< numbers of cells, descending at first
   std::vector<ClusterCell*> changed_;
-  float last_radius_ = 0;  ///< [m] of area_units(), which asks for the same again and again
-  std::int64_t last_area_ = 0;
+  std::array<BlockKey, kBatch> keys_;  ///< of put(); here, as filling them anew each time would take longer than what is done with them
 };
 
 }  // namespace frontier_surfels

@@ -12,7 +12,7 @@
 namespace frontier_surfels {
 namespace {
 
-bool by_key(const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; }
+constexpr auto by_key = [](const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; };  // not a function: it is inlined
 
 CellBox box_of(const ClusterPartition::Cells& cells) {
   CellBox box(cells.front()->key);
@@ -316,25 +316,28 @@ ClusterPartition::Contacts ClusterPartition::contacts(const Group& group) {
 
 /// The connected parts of cells that are given by key, in the order of their first cells. Each is ordered by key.
 std::vector<ClusterPartition::Cells> ClusterPartition::components(const Cells& cells) {
-  const std::uint32_t mark = ++mark_;
-  for (ClusterCell* cell : cells) cell->mark = mark;
+  const std::uint32_t open = ++mark_;
+  for (ClusterCell* cell : cells) cell->mark = open;
   visited_ += cells.size();
-  std::vector<Cells> parts;
+  Cells reached;
+  reached.reserve(cells.size());
   for (ClusterCell* first : cells) {
-    if (first->mark != mark) continue;
-    Cells part = {first};
-    first->mark = 0;
-    for (std::size_t next = 0; next < part.size(); ++next) {
-      if (part.size() == cells.size()) return {cells};  // all are connected
-      ClusterLattice::for_neighbours(*part[next], [&](ClusterCell& other) {
-        if (other.mark != mark) return;
-        other.mark = 0;
-        part.push_back(&other);
+    if (first->mark != open) continue;
+    const std::uint32_t own = ++mark_;
+    const auto reach = [&](ClusterCell& cell) {
+      cell.mark = own;
+      reached.push_back(&cell);
+    };
+    std::size_t next = reached.size();
+    reach(*first);
+    for (; next < reached.size() && reached.size() < cells.size(); ++next)
+      ClusterLattice::for_neighbours(*reached[next], [&](ClusterCell& other) {
+        if (other.mark == open) reach(other);
       });
-    }
-    std::sort(part.begin(), part.end(), by_key);
-    parts.push_back(std::move(part));
   }
+  if (mark_ == open + 1) return {cells};  // all are connected
+  std::vector<Cells> parts(mark_ - open);
+  for (ClusterCell* cell : cells) parts[cell->mark - open - 1].push_back(cell);
   return parts;
 }
 
