@@ -35,9 +35,30 @@ Eigen::Vector3f unpack_normal(std::uint32_t bits) {
   Eigen::Vector3f n(coordinate(bits), coordinate(bits >> 16), 0);  // whole numbers, exact until normalized()
   n.z() = kNormal - std::abs(n.x()) - std::abs(n.y());
   const float over = std::max(-n.z(), 0.0F);
-  n.x() += n.x() < 0 ? over : -over;
-  n.y() += n.y() < 0 ? over : -over;
-  return n.normalized();
+  n.x() -= std::copysign(over, n.x());  // a branch on the sign would be guessed wrongly every other time
+  n.y() -= std::copysign(over, n.y());
+  const Eigen::Array4f padded(n.x(), n.y(), n.z(), 0);  // divided all at once
+  return (padded / n.norm()).head<3>();
+}
+
+/// Calls of public functions within a shared library go through a table; this one is inlined.
+inline Surfel unpack_inline(const cl_uint4& packed, const BlockKey& block, double block_size) {
+  const auto& [x, y, normal, attributes] = packed.s;
+  Surfel surfel;
+  surfel.position = {unpack_coordinate(x & 0xffff, block.x, block_size), unpack_coordinate(x >> 16, block.y, block_size),
+                     unpack_coordinate(y & 0xffff, block.z, block_size)};
+  surfel.radius = static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(static_cast<std::uint16_t>(y >> 16)));
+  surfel.normal = unpack_normal(normal);
+  surfel.label = attributes & SURFEL_OCCUPIED ? Label::kOccupied : Label::kFrontier;
+  for (int channel = 0; channel < 3; ++channel) surfel.rgb[channel] = static_cast<std::uint8_t>(attributes >> (8 * channel));
+  return surfel;
+}
+
+inline void unpack_slot(const cl_uint4& packed, cl_uint slot, const std::vector<cl_int4>& page_block, double block_size,
+                        std::vector<Surfel>& to) {
+  const auto& block = page_block[slot / PAGE_SLOTS].s;
+  to.push_back(unpack_inline(packed, {block[0], block[1], block[2]}, block_size));
+  to.back().id = slot;
 }
 
 }  // namespace
@@ -57,16 +78,16 @@ cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size) {
            pack_normal(surfel.normal), attributes}};
 }
 
-Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) {
-  const auto& [x, y, normal, attributes] = packed.s;
-  Surfel surfel;
-  surfel.position = {unpack_coordinate(x & 0xffff, block.x, block_size), unpack_coordinate(x >> 16, block.y, block_size),
-                     unpack_coordinate(y & 0xffff, block.z, block_size)};
-  surfel.radius = static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(static_cast<std::uint16_t>(y >> 16)));
-  surfel.normal = unpack_normal(normal);
-  surfel.label = attributes & SURFEL_OCCUPIED ? Label::kOccupied : Label::kFrontier;
-  for (int channel = 0; channel < 3; ++channel) surfel.rgb[channel] = static_cast<std::uint8_t>(attributes >> (8 * channel));
-  return surfel;
+Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) { return unpack_inline(packed, block, block_size); }
+
+void unpack_gathered(const std::vector<cl_uint4>& packed, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block,
+                     double block_size, std::vector<Surfel>& to) {
+  for (std::size_t n = 0; n < slots.size(); ++n) unpack_slot(packed[n], slots[n], page_block, block_size, to);
+}
+
+void unpack_slots(const cl_uint4* surfels, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block, double block_size,
+                  std::vector<Surfel>& to) {
+  for (const cl_uint slot : slots) unpack_slot(surfels[slot], slot, page_block, block_size, to);
 }
 
 std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes) {

@@ -1,8 +1,13 @@
 #include "planner/cluster_lattice.hpp"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <new>
 #include <string>
+#include <utility>
 
 #include "planner/rounding.hpp"
 
@@ -10,7 +15,6 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kAhead = 16;    // surfels between asking for memory and using it
-constexpr std::size_t kBatch = 64;    // surfels
 constexpr float kFarthest = 1e6F;     // [m] nothing is mapped beyond
 constexpr float kLargestRadius = 10;  // [m]
 
@@ -45,37 +49,38 @@ inline BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
 }
 
 /// Nullptr if no surfel near this id was ever seen.
-inline ClusterLattice::Kept* ClusterLattice::kept(std::uint32_t id) {
+inline ClusterLattice::Page* ClusterLattice::page_of(std::uint32_t id) {
   const std::size_t page = id / kPage;
-  return page < pages_.size() && pages_[page] ? &pages_[page]->surfels[id % kPage] : nullptr;
+  return page < pages_.size() ? pages_[page] : nullptr;
 }
 
-inline void ClusterLattice::count(const Kept& surfel, std::int64_t sign) {
-  ClusterCell& cell = this->cell(surfel.cell);
+/// Nullptr if there is no surfel with this id.
+inline ClusterLattice::Kept* ClusterLattice::kept(Page* page, std::uint32_t id) {
+  return page != nullptr && (page->exists >> id % kPage & 1) != 0 ? &page->surfels[id % kPage] : nullptr;
+}
+
+/// Counts a surfel of a cell once more (1) or once less (-1).
+inline void ClusterLattice::count(ClusterCell& cell, const Kept& surfel, std::int64_t sign) {
   if (!cell.changed) changed_.push_back(&cell);
   cell.changed = true;
   if (!surfel.is_frontier()) {
     cell.occupied += static_cast<std::uint32_t>(sign);
     return;
   }
-  const BlockKey& key = cell.key;
   cell.frontier += static_cast<std::uint32_t>(sign);
   cell.area += sign * in_units(area_of(surfel.signed_radius), kAreaUnit);
-  const int corner[] = {key.x, key.y, key.z};
+  const std::array<double, 3> corner = {cell.key.x * cell_, cell.key.y * cell_, cell.key.z * cell_};
   for (int axis = 0; axis < 3; ++axis) {
-    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis] * cell_, kLengthUnit);
+    cell.position[axis] += sign * in_units(surfel.position[axis] - corner[axis], kLengthUnit);
     cell.normal[axis] += sign * in_units(surfel.normal[axis], kNormalUnit);
   }
 }
 
-inline void ClusterLattice::change(Kept& before, Kept now) {
-  // Of an occupied surfel only its cell counts.
-  const bool same_cell = before.exists() && before.cell == now.cell;
-  if (!same_cell || before.is_frontier() || now.is_frontier()) {
-    if (before.exists()) count(before, -1);
-    count(now, 1);
-  }
-  before = now;
+/// @param cell  that `now` lies in
+inline void ClusterLattice::change(const Kept& before, const Kept& now, ClusterCell& cell) {
+  if (before.cell == now.cell && !before.is_frontier() && !now.is_frontier()) return;  // of an occupied surfel only its cell counts
+  count(this->cell(before.cell), before, -1);
+  count(cell, now, 1);
 }
 
 /// Nullptr if there is none. Those that were asked for before are tried first.
@@ -99,6 +104,8 @@ void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
     pages_.clear();
+    memory_.clear();
+    page_count_ = 0;
     cubes_.clear();
     recent_cubes_ = {};
     chunks_.clear();
@@ -120,41 +127,63 @@ void ClusterLattice::check(const Changes& changes) const {
 void ClusterLattice::remove(const std::vector<std::uint32_t>& ids) {
   for (std::size_t n = 0; n < ids.size(); ++n) {
     // Memory is asked for what comes soon: first the surfel, then its cell.
-    if (n + 2 * kAhead < ids.size()) prefetch(kept(ids[n + 2 * kAhead]));
+    if (n + 2 * kAhead < ids.size())
+      if (Page* page = page_of(ids[n + 2 * kAhead])) prefetch(&page->surfels[ids[n + 2 * kAhead] % kPage]);
     if (n + kAhead < ids.size()) {
-      const Kept* next = kept(ids[n + kAhead]);
-      if (next != nullptr && next->exists()) prefetch(&cell(next->cell));
+      const Kept* next = kept(page_of(ids[n + kAhead]), ids[n + kAhead]);
+      if (next != nullptr) prefetch(&cell(next->cell));
     }
-    Kept* before = kept(ids[n]);
-    if (before == nullptr || !before->exists()) continue;
-    count(*before, -1);
-    *before = {};
+    Page* page = page_of(ids[n]);
+    const Kept* before = kept(page, ids[n]);
+    if (before == nullptr) continue;
+    count(cell(before->cell), *before, -1);
+    page->exists &= ~(std::uint64_t{1} << ids[n] % kPage);
   }
 }
 
 /// @param count  at most kBatch
 void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
-  std::array<BlockKey, kBatch> keys;
   std::array<ClusterCell*, kBatch> cells;
   for (std::size_t n = 0; n < count; ++n) {
-    prefetch(kept(surfels[n].id));
-    keys[n] = key_of(surfels[n].position);
+    if (Page* page = page_of(surfels[n].id)) prefetch(&page->surfels[surfels[n].id % kPage]);
+    keys_[n] = key_of(surfels[n].position);
   }
   for (std::size_t n = 0; n < count; ++n) {
-    cells[n] = find(keys[n]);
-    prefetch(cells[n]);
+    const bool as_before = n > 0 && keys_[n] == keys_[n - 1];
+    cells[n] = as_before ? cells[n - 1] : find(keys_[n]);
+    if (!as_before) prefetch(cells[n]);
   }
   for (std::size_t n = 0; n < count; ++n) {
     const Surfel& s = surfels[n];
-    const std::size_t page = s.id / kPage;
-    if (page >= pages_.size()) pages_.resize(page + 1);
-    if (!pages_[page]) pages_[page] = std::make_unique<Page>();
-    Kept& before = *kept(s.id);
-    Kept now = {s.position, s.normal, s.label == Label::kFrontier ? s.radius : -s.radius, 0};
-    if (before.looks_like(now)) continue;
-    now.cell = (cells[n] != nullptr ? *cells[n] : cell_at(keys[n])).number;
-    change(before, now);
+    if (s.id / kPage >= pages_.size()) pages_.resize(s.id / kPage + 1);
+    Page*& page = pages_[s.id / kPage];
+    if (page == nullptr) page = take_page();
+    Kept now = {{s.position.x(), s.position.y(), s.position.z()},
+                {s.normal.x(), s.normal.y(), s.normal.z()},
+                s.label == Label::kFrontier ? s.radius : -s.radius,
+                0};
+    const Kept* before = kept(page, s.id);
+    if (before != nullptr && before->looks_like(now)) continue;
+    ClusterCell& cell = cells[n] != nullptr ? *cells[n] : cell_at(keys_[n]);
+    now.cell = cell.number;
+    if (before != nullptr)
+      change(*before, now, cell);
+    else
+      this->count(cell, now, 1);
+    page->surfels[s.id % kPage] = now;
+    page->exists |= std::uint64_t{1} << s.id % kPage;
   }
+}
+
+/// Pages come in large pieces of memory: else the first touch of each of its small pages takes as long as what is done with the surfels.
+ClusterLattice::Page* ClusterLattice::take_page() {
+  if (page_count_ == memory_.size() * kPagesAtOnce) {
+    void* memory = std::aligned_alloc(kHugePage, kHugePage);
+    if (memory == nullptr) throw std::bad_alloc();
+    memory_.emplace_back(static_cast<Page*>(memory));
+    madvise(memory, kHugePage, MADV_HUGEPAGE);  // only advice: it may fail
+  }
+  return new (memory_.back().get() + page_count_++ % kPagesAtOnce) Page();
 }
 
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {
@@ -184,36 +213,33 @@ std::uint32_t ClusterLattice::take_number() {
 }
 
 void ClusterLattice::link(ClusterCell& cell) {
-  BlockKey cube_key = cube_of(cell.key);
-  const Cube* cube = find_cube(cube_key);
-  for (int n = 0; n < 26; ++n) {
-    const int place = n < 13 ? n : n + 1;  // of 27
-    const BlockKey key = {cell.key.x + place / 9 - 1, cell.key.y + place / 3 % 3 - 1, cell.key.z + place % 3 - 1};
-    if (cube_of(key) != cube_key) {
-      cube_key = cube_of(key);
-      cube = find_cube(cube_key);
-    }
-    const std::uint32_t number = cube == nullptr ? 0 : cube->cells[place_of(key)];
-    if (number == 0) continue;
-    ClusterCell& other = this->cell(number);
-    cell.neighbours[n] = &other;
-    other.neighbours[25 - n] = &cell;
-  }
+  // The cells around lie in up to two cubes along each axis: these are looked up once.
+  const BlockKey low = cube_of({cell.key.x - 1, cell.key.y - 1, cell.key.z - 1});
+  std::array<const Cube*, 8> cubes = {};
+  std::array<bool, 8> known = {};
+  BlockKey key;
+  int n = 0;
+  for (key.x = cell.key.x - 1; key.x <= cell.key.x + 1; ++key.x)
+    for (key.y = cell.key.y - 1; key.y <= cell.key.y + 1; ++key.y)
+      for (key.z = cell.key.z - 1; key.z <= cell.key.z + 1; ++key.z) {
+        if (key == cell.key) continue;
+        const BlockKey cube = cube_of(key);
+        const int index = (cube.x - low.x) * 4 + (cube.y - low.y) * 2 + (cube.z - low.z);
+        if (!known[index]) cubes[index] = find_cube(cube);
+        known[index] = true;
+        const std::uint32_t number = cubes[index] == nullptr ? 0 : cubes[index]->cells[place_of(key)];
+        if (number != 0) {
+          ClusterCell& other = this->cell(number);
+          cell.neighbours[n] = &other;
+          other.neighbours[25 - n] = &cell;
+        }
+        ++n;
+      }
 }
 
 std::vector<ClusterCell*> ClusterLattice::take_changed() {
-  std::vector<std::pair<BlockKey, ClusterCell*>> by_key;  // with the keys, as looking them up takes longer than comparing them
-  by_key.reserve(changed_.size());
-  for (ClusterCell* cell : changed_) {
-    cell->changed = false;
-    by_key.emplace_back(cell->key, cell);
-  }
-  changed_.clear();
-  std::sort(by_key.begin(), by_key.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<ClusterCell*> changed;
-  changed.reserve(by_key.size());
-  for (const auto& [key, cell] : by_key) changed.push_back(cell);
-  return changed;
+  for (ClusterCell* cell : changed_) cell->changed = false;
+  return std::exchange(changed_, {});
 }
 
 void ClusterLattice::forget_empty(const std::vector<ClusterCell*>& cells) {
@@ -234,12 +260,6 @@ void ClusterLattice::forget(ClusterCell& cell) {
   if (--cube->count > 0) return;
   recent_cubes_[std::hash<BlockKey>()(cube_key) % kRecent] = {};
   cubes_.erase(cube_key);
-}
-
-Eigen::Vector3d ClusterLattice::mean_position(const ClusterCell& cell) const {
-  const Eigen::Vector3d corner = Eigen::Vector3d(cell.key.x, cell.key.y, cell.key.z) * cell_;
-  const Eigen::Vector3d sum(cell.position[0], cell.position[1], cell.position[2]);
-  return corner + sum * (kLengthUnit / std::max(1U, cell.frontier));
 }
 
 }  // namespace frontier_surfels

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <memory>
 #include <unordered_map>
 #include <utility>
@@ -42,7 +44,7 @@ class ClusterLattice {
   /// @throws Error  a surfel cannot be used; nothing has changed
   void apply(const Changes& changes);
 
-  /// Cells that differ from those at the last call, by key. Those without surfels are to be given to forget_empty().
+  /// Cells that differ from those at the last call, in no certain order. All are to be given to forget_empty().
   std::vector<ClusterCell*> take_changed();
   void forget_empty(const std::vector<ClusterCell*>& cells);
 
@@ -54,17 +56,21 @@ class ClusterLattice {
   }
 
   double cell() const { return cell_; }
-  Eigen::Vector3d mean_position(const ClusterCell& cell) const;  ///< of its frontier surfels, world frame [m]
+
+  /// Of a cell's frontier surfels, world frame [m].
+  Eigen::Vector3d mean_position(const ClusterCell& cell) const {
+    const Eigen::Vector3d corner = Eigen::Vector3d(cell.key.x, cell.key.y, cell.key.z) * cell_;
+    const Eigen::Vector3d sum(cell.position[0], cell.position[1], cell.position[2]);
+    return corner + sum * (kLengthUnit / std::max(1U, cell.frontier));
+  }
 
  private:
   /// What is kept of a surfel, to tell what changes.
   struct Kept {
-    Eigen::Vector3f position = Eigen::Vector3f::Zero();
-    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-    float signed_radius = 0;  ///< [m] negative for occupied surfels; 0: there is no surfel with this id
-    std::uint32_t cell = 0;   ///< number of the cell that counts it
+    std::array<float, 3> position, normal;
+    float signed_radius;  ///< [m] negative for occupied surfels
+    std::uint32_t cell;   ///< number of the cell that counts it
 
-    bool exists() const { return signed_radius != 0; }
     bool is_frontier() const { return signed_radius > 0; }
     bool looks_like(const Kept& other) const {
       return signed_radius == other.signed_radius && position == other.position && normal == other.normal;
@@ -72,7 +78,9 @@ class ClusterLattice {
   };
   static constexpr std::size_t kPage = 64;
   struct alignas(64) Page {
+    Page() {}  // filling the surfels would take longer than all that is done with them
     std::array<Kept, kPage> surfels;
+    std::uint64_t exists = 0;  ///< a bit for each surfel that there is; the others are not filled in
   };
 
   /// Numbers of 8^3 cells, 0 where there is none; most questions after neighbours end in the same cube.
@@ -80,6 +88,7 @@ class ClusterLattice {
     std::array<std::uint32_t, 512> cells = {};
     int count = 0;
   };
+  static constexpr std::size_t kBatch = 64;   ///< surfels that are put at a time
   static constexpr std::size_t kRecent = 64;  ///< a power of two
 
   static constexpr std::uint32_t kChunk = 256;
@@ -89,11 +98,13 @@ class ClusterLattice {
   Cube* find_cube(const BlockKey& cube);
 
   void check(const Changes& changes) const;
-  Kept* kept(std::uint32_t id);
+  Page* page_of(std::uint32_t id);
+  Page* take_page();
+  static Kept* kept(Page* page, std::uint32_t id);
   void remove(const std::vector<std::uint32_t>& ids);
   void put(const Surfel* surfels, std::size_t count);
-  void change(Kept& before, Kept now);
-  void count(const Kept& surfel, std::int64_t sign);
+  void change(const Kept& before, const Kept& now, ClusterCell& cell);
+  void count(ClusterCell& cell, const Kept& surfel, std::int64_t sign);
   ClusterCell& cell(std::uint32_t number) { return (*chunks_[number / kChunk])[number % kChunk]; }
   ClusterCell& cell_at(const BlockKey& key);
   ClusterCell* find(const BlockKey& key);
@@ -102,14 +113,22 @@ class ClusterLattice {
   void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
-  double cell_;       ///< [m]
-  double per_metre_;  ///< [cell/m]
-  std::vector<std::unique_ptr<Page>> pages_;
+  double cell_;                                                   ///< [m]
+  double per_metre_;                                              ///< [cell/m]
+  static constexpr std::size_t kHugePage = std::size_t{1} << 21;  ///< [byte] on most processors
+  static constexpr std::size_t kPagesAtOnce = kHugePage / sizeof(Page);
+  struct Free {
+    void operator()(Page* pages) const { std::free(pages); }
+  };
+  std::vector<std::unique_ptr<Page, Free>> memory_;  ///< of the pages
+  std::size_t page_count_ = 0;
+  std::vector<Page*> pages_;  ///< null: none
   std::unordered_map<BlockKey, Cube> cubes_;
   std::array<std::pair<BlockKey, Cube*>, kRecent> recent_cubes_ = {};  ///< of find_cube(), by hash; null: none
   std::vector<std::unique_ptr<Chunk>> chunks_;                         ///< cells by number
   std::vector<std::uint32_t> unused_;                                  ///< numbers of cells, descending at first
   std::vector<ClusterCell*> changed_;
+  std::array<BlockKey, kBatch> keys_;  ///< of put(); here, as filling them anew each time would take longer than what is done with them
 };
 
 }  // namespace frontier_surfels

@@ -7,15 +7,23 @@
 #include <iterator>
 #include <utility>
 
+#include "planner/cell_bits.hpp"
+
 namespace frontier_surfels {
 namespace {
 
-bool by_key(const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; }
+constexpr auto by_key = [](const ClusterCell* a, const ClusterCell* b) { return a->key < b->key; };  // not a function: it is inlined
 
 CellBox box_of(const ClusterPartition::Cells& cells) {
   CellBox box(cells.front()->key);
   for (const ClusterCell* cell : cells) box.extend(CellBox(cell->key));
   return box;
+}
+
+std::int64_t area_of(const ClusterPartition::Cells& cells) {
+  std::int64_t area = 0;
+  for (const ClusterCell* cell : cells) area += cell->area;
+  return area;
 }
 
 void add_contact(std::uint32_t id, std::vector<std::pair<std::uint32_t, int>>& contacts) {
@@ -101,7 +109,7 @@ std::set<std::uint32_t> ClusterPartition::update(const Cells& changed) {
   return touched_;
 }
 
-/// Takes cells that have no frontier any more out of their clusters. @return cells that have one, but no cluster yet
+/// Takes cells that have no frontier any more out of their clusters. @return cells that have one, but no cluster yet, by key
 ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
   Cells fresh;
   std::uint32_t last = 0;
@@ -125,17 +133,19 @@ ClusterPartition::Cells ClusterPartition::sort_changes(const Cells& changed) {
     Cells& cells = groups_.at(id).cells;
     cells.erase(std::remove_if(cells.begin(), cells.end(), [](const ClusterCell* cell) { return cell->cluster == 0; }), cells.end());
   }
+  std::sort(fresh.begin(), fresh.end(), by_key);
   return fresh;
 }
 
-/// Brings a group's sums up to date after it has lost cells. Without cells, it ends.
+/// Brings a group's box up to date after it has lost cells; merge_small() sums up its area. Without cells, it ends.
 void ClusterPartition::count(std::uint32_t id) {
   const auto at = groups_.find(id);
   if (at->second.cells.empty()) {
     groups_.erase(at);
     shrunk_.erase(id);
   } else {
-    at->second = group_of(std::move(at->second.cells));
+    at->second.box = box_of(at->second.cells);
+    visited_ += at->second.cells.size();
   }
 }
 
@@ -143,19 +153,19 @@ void ClusterPartition::count(std::uint32_t id) {
 ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
   std::map<std::uint32_t, std::size_t> grown;  // numbers of cells before, by cluster
   for (Cells open = fresh; !open.empty();) {
-    std::vector<std::pair<ClusterCell*, std::uint32_t>> ring;
+    std::vector<std::pair<ClusterCell*, Owner*>> ring;
     for (ClusterCell* cell : open) {
       ++visited_;
-      const std::uint32_t id = neighbour_with_room(*cell);
-      if (id == 0) continue;
-      groups_.at(id).box.extend(CellBox(cell->key));
-      ring.emplace_back(cell, id);
+      Owner* owner = neighbour_with_room(*cell);
+      if (owner == nullptr) continue;
+      owner->second.box.extend(CellBox(cell->key));
+      ring.emplace_back(cell, owner);
     }
     // Cells of a ring do not see each other: else those with larger keys would be reached first.
-    for (const auto& [cell, id] : ring) {
-      cell->cluster = id;
-      Cells& cells = groups_.at(id).cells;
-      grown.emplace(id, cells.size());
+    for (const auto& [cell, owner] : ring) {
+      cell->cluster = owner->first;
+      Cells& cells = owner->second.cells;
+      grown.try_emplace(owner->first, cells.size());
       cells.push_back(cell);
     }
     open = next_ring(ring);
@@ -172,10 +182,10 @@ ClusterPartition::Cells ClusterPartition::join(Cells fresh) {
 }
 
 /// Cells without a cluster next to those that have just got one, by key. Others had no room near by and have none now, since clusters grow.
-ClusterPartition::Cells ClusterPartition::next_ring(const std::vector<std::pair<ClusterCell*, std::uint32_t>>& ring) {
+ClusterPartition::Cells ClusterPartition::next_ring(const std::vector<std::pair<ClusterCell*, Owner*>>& ring) {
   const std::uint32_t mark = ++mark_;
   Cells next;
-  for (const auto& [cell, id] : ring)
+  for (const auto& [cell, owner] : ring)
     ClusterLattice::for_neighbours(*cell, [&](ClusterCell& other) {
       if (other.frontier == 0 || other.cluster != 0 || other.mark == mark) return;
       other.mark = mark;
@@ -185,8 +195,8 @@ ClusterPartition::Cells ClusterPartition::next_ring(const std::vector<std::pair<
   return next;
 }
 
-/// The cluster with most cells next to this one, of those that it does not make too large; 0: none.
-std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
+/// The cluster with most cells next to this one, of those that it does not make too large; null: none.
+ClusterPartition::Owner* ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
   Contacts& contacts = cell_contacts_;  // kept for its memory
   contacts.clear();
   ClusterLattice::for_neighbours(cell, [&](const ClusterCell& other) {
@@ -194,16 +204,22 @@ std::uint32_t ClusterPartition::neighbour_with_room(const ClusterCell& cell) {
   });
   if (contacts.size() > 1) std::sort(contacts.begin(), contacts.end(), more_contact);
   for (const auto& [id, pairs] : contacts) {
-    CellBox box = groups_.at(id).box;
+    Owner& owner = *groups_.find(id);
+    CellBox box = owner.second.box;
     box.extend(CellBox(cell.key));
-    if (box.longest_edge() <= max_extent_) return id;
+    if (box.longest_edge() <= max_extent_) return &owner;
   }
-  return 0;
+  return nullptr;
 }
 
 /// Makes several clusters of one that has fallen apart. The part of the largest area keeps the id.
 void ClusterPartition::divide(std::uint32_t id) {
-  std::vector<Cells> parts = components(groups_.at(id).cells);
+  const Group& whole = groups_.at(id);
+  if (CellBits::fits(whole.box) && CellBits(whole.cells, whole.box).are_connected()) {
+    visited_ += whole.cells.size();
+    return;
+  }
+  std::vector<Cells> parts = components(whole.cells);
   if (parts.size() == 1) return;
   const auto area_less = [](const Group& a, const Group& b) { return a.area < b.area; };
   std::vector<Group> groups;
@@ -243,7 +259,9 @@ void ClusterPartition::divide_to_extent(const Cells& cells, std::vector<Cells>& 
 void ClusterPartition::merge_small() {
   for (const std::uint32_t id : std::set<std::uint32_t>(touched_)) {
     const auto at = groups_.find(id);
-    if (at != groups_.end()) at->second = group_of(std::move(at->second.cells));
+    if (at == groups_.end()) continue;
+    at->second.area = area_of(at->second.cells);
+    visited_ += at->second.cells.size();
   }
   // Those next to a cluster that has changed may have room now. Small ones are few, so all of them try.
   std::set<std::uint32_t> open;
@@ -298,32 +316,34 @@ ClusterPartition::Contacts ClusterPartition::contacts(const Group& group) {
 
 /// The connected parts of cells that are given by key, in the order of their first cells. Each is ordered by key.
 std::vector<ClusterPartition::Cells> ClusterPartition::components(const Cells& cells) {
-  const std::uint32_t mark = ++mark_;
-  for (ClusterCell* cell : cells) cell->mark = mark;
+  const std::uint32_t open = ++mark_;
+  for (ClusterCell* cell : cells) cell->mark = open;
   visited_ += cells.size();
-  std::vector<Cells> parts;
+  Cells reached;
+  reached.reserve(cells.size());
   for (ClusterCell* first : cells) {
-    if (first->mark != mark) continue;
-    Cells part = {first};
-    first->mark = 0;
-    for (std::size_t next = 0; next < part.size(); ++next) {
-      if (part.size() == cells.size()) return {cells};  // all are connected
-      ClusterLattice::for_neighbours(*part[next], [&](ClusterCell& other) {
-        if (other.mark != mark) return;
-        other.mark = 0;
-        part.push_back(&other);
+    if (first->mark != open) continue;
+    const std::uint32_t own = ++mark_;
+    const auto reach = [&](ClusterCell& cell) {
+      cell.mark = own;
+      reached.push_back(&cell);
+    };
+    std::size_t next = reached.size();
+    reach(*first);
+    for (; next < reached.size() && reached.size() < cells.size(); ++next)
+      ClusterLattice::for_neighbours(*reached[next], [&](ClusterCell& other) {
+        if (other.mark == open) reach(other);
       });
-    }
-    std::sort(part.begin(), part.end(), by_key);
-    parts.push_back(std::move(part));
   }
+  if (mark_ == open + 1) return {cells};  // all are connected
+  std::vector<Cells> parts(mark_ - open);
+  for (ClusterCell* cell : cells) parts[cell->mark - open - 1].push_back(cell);
   return parts;
 }
 
 ClusterPartition::Group ClusterPartition::group_of(Cells cells) {
   const CellBox box = box_of(cells);
-  std::int64_t area = 0;
-  for (const ClusterCell* cell : cells) area += cell->area;
+  const std::int64_t area = area_of(cells);
   visited_ += cells.size();
   return {std::move(cells), area, box};
 }

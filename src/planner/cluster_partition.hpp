@@ -33,7 +33,7 @@ class ClusterPartition {
   /// @param max_extent  longest edge of a cluster's box [cell]. @param min_area  below it, clusters join others [kAreaUnit]
   ClusterPartition(int max_extent, std::int64_t min_area) : max_extent_(max_extent), min_area_(min_area) {}
 
-  /// Follows changes of cells, given by key. @return ids of clusters that are new, or have changed in any way; some may be gone
+  /// Follows changes of cells, in any order. @return ids of clusters that are new, or have changed in any way; some may be gone
   std::set<std::uint32_t> update(const Cells& changed);
 
   /// To be called when the lattice forgets all cells. Ids are not given again.
@@ -47,9 +47,10 @@ class ClusterPartition {
   using Contacts = std::vector<std::pair<std::uint32_t, int>>;
 
   Cells sort_changes(const Cells& changed);
+  using Owner = std::pair<const std::uint32_t, Group>;  ///< a group with its id
   Cells join(Cells fresh);
-  std::uint32_t neighbour_with_room(const ClusterCell& cell);
-  Cells next_ring(const std::vector<std::pair<ClusterCell*, std::uint32_t>>& ring);
+  Owner* neighbour_with_room(const ClusterCell& cell);
+  Cells next_ring(const std::vector<std::pair<ClusterCell*, Owner*>>& ring);
   void divide(std::uint32_t id);
   void found(const Cells& cells);
   void merge_small();

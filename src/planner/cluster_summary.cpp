@@ -1,7 +1,8 @@
 #include "planner/cluster_summary.hpp"
 
+#include <algorithm>
+#include <array>
 #include <limits>
-#include <map>
 
 #include "planner/rounding.hpp"
 
@@ -23,55 +24,92 @@ Eigen::Vector3d normal_sum(const ClusterCell& cell) {
 
 BlockKey coarse(const BlockKey& key, int edge) { return {divide_down(key.x, edge), divide_down(key.y, edge), divide_down(key.z, edge)}; }
 
-/// A cell with the mean position of its surfels, world frame [m].
+/// A cell with the mean position of its surfels, world frame [m], and the cube that it lies in.
 struct Place {
   const ClusterCell* cell = nullptr;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::size_t cube = 0;
 };
 using Places = std::vector<Place>;
 
-/// The cells in cubes of an edge [cell]; none if that makes more than kMostPoints.
-std::map<BlockKey, Places> in_cubes(const Places& places, int edge) {
-  std::map<BlockKey, Places> cubes;
-  auto last = cubes.end();  // cells that follow each other often lie in the same cube
-  for (const Place& place : places) {
-    const BlockKey cube = coarse(place.cell->key, edge);
-    if (last == cubes.end() || last->first != cube) last = cubes.try_emplace(cube).first;
-    last->second.push_back(place);
-    if (cubes.size() > kMostPoints) return {};
+/// Cubes of cells, found by their keys.
+class Cubes {
+ public:
+  struct Cube {
+    BlockKey key;
+    std::size_t cells = 0;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< of its places [m]
+    const Place* middle = nullptr;                   ///< the place next to it
+    double least = std::numeric_limits<double>::infinity();
+  };
+
+  /// Number of the cube with this key; kMostPoints if there would be too many.
+  std::size_t number_of(const BlockKey& key) {
+    std::size_t slot = std::hash<BlockKey>()(key) % kSlots;
+    for (; slots_[slot] != 0; slot = (slot + 1) % kSlots)
+      if (cubes_[slots_[slot] - 1].key == key) return slots_[slot] - 1U;
+    if (count_ == kMostPoints) return kMostPoints;
+    cubes_[count_].key = key;
+    slots_[slot] = static_cast<std::uint8_t>(++count_);
+    return count_ - 1;
   }
-  return cubes;
+
+  Cube& operator[](std::size_t number) { return cubes_[number]; }
+
+  /// All cubes, by key.
+  std::vector<const Cube*> sorted() const {
+    std::vector<const Cube*> all;
+    for (std::size_t n = 0; n < count_; ++n) all.push_back(&cubes_[n]);
+    std::sort(all.begin(), all.end(), [](const Cube* a, const Cube* b) { return a->key < b->key; });
+    return all;
+  }
+
+ private:
+  static constexpr std::size_t kSlots = 4 * kMostPoints;
+  std::array<std::uint8_t, kSlots> slots_ = {};  ///< number of a cube + 1; 0: none
+  std::array<Cube, kMostPoints> cubes_;
+  std::size_t count_ = 0;
+};
+
+/// Finds the cubes of an edge [cell] that places lie in. @return false  there are more than kMostPoints
+bool put_in_cubes(Places& places, int edge, Cubes& cubes) {
+  BlockKey last;
+  const Place* before = nullptr;  // cells that follow each other often lie in the same cube
+  for (Place& place : places) {
+    const BlockKey key = coarse(place.cell->key, edge);
+    place.cube = before != nullptr && key == last ? before->cube : cubes.number_of(key);
+    if (place.cube == kMostPoints) return false;
+    ++cubes[place.cube].cells;
+    last = key;
+    before = &place;
+  }
+  return true;
 }
 
-/// The cells in cubes, of the smallest size at which there are few enough.
-std::map<BlockKey, Places> thinned(const Places& places) {
+/// The cells in the middle of cubes of the smallest size at which there are few enough; the mean of all might lie off the boundary.
+std::vector<const Place*> thinned(Places& places) {
   int edge = 1;
   while (kMostPoints * edge * edge * edge < places.size()) ++edge;  // even full cubes would be too many
-  for (;; ++edge) {
-    std::map<BlockKey, Places> cubes = in_cubes(places, edge);
-    if (!cubes.empty()) return cubes;
-  }
-}
-
-/// The cell in the middle: the mean of all might lie off the boundary.
-const Place& middle(const Places& places) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Place& place : places) mean += place.position / static_cast<double>(places.size());
-  const Place* nearest = nullptr;
-  double least = std::numeric_limits<double>::infinity();
+  Cubes cubes;
+  while (!put_in_cubes(places, edge++, cubes)) cubes = {};
+  for (const Place& place : places) cubes[place.cube].mean += place.position / static_cast<double>(cubes[place.cube].cells);
   for (const Place& place : places) {
-    const double distance = (place.position - mean).squaredNorm();
-    if (distance < least) {
-      least = distance;
-      nearest = &place;
-    }
+    Cubes::Cube& cube = cubes[place.cube];
+    const double distance = (place.position - cube.mean).squaredNorm();
+    if (distance >= cube.least) continue;
+    cube.least = distance;
+    cube.middle = &place;
   }
-  return *nearest;
+  std::vector<const Place*> middles;
+  for (const Cubes::Cube* cube : cubes.sorted()) middles.push_back(cube->middle);
+  return middles;
 }
 
 bool near_occupied(const Cells& cells) {
+  for (const ClusterCell* cell : cells)  // the quick way first
+    if (cell->occupied > 0) return true;
   for (const ClusterCell* cell : cells) {
-    bool found = cell->occupied > 0;
+    bool found = false;
     ClusterLattice::for_neighbours(*cell, [&](const ClusterCell& other) { found = found || other.occupied > 0; });
     if (found) return true;
   }
@@ -87,7 +125,7 @@ Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const Cl
   Places places;
   places.reserve(group.cells.size());
   for (const ClusterCell* cell : group.cells) {
-    places.push_back({cell, lattice.mean_position(*cell)});
+    places.push_back({cell, lattice.mean_position(*cell), 0});
     cluster.surfels += cell->frontier;
     centroid += places.back().position * (static_cast<double>(cell->area) / static_cast<double>(group.area));
     normal += normal_sum(*cell) / cell->frontier * (static_cast<double>(cell->area) * kAreaUnit);
@@ -99,10 +137,8 @@ Cluster summary(std::uint32_t id, const ClusterPartition::Group& group, const Cl
     return Eigen::Vector3f((Eigen::Vector3d(key.x + more, key.y + more, key.z + more) * lattice.cell()).cast<float>());
   };
   cluster.box = {corner(group.box.low, 0), corner(group.box.high, 1)};
-  for (const auto& [key, some] : thinned(places)) {
-    const Place& place = middle(some);
-    cluster.points.push_back({place.position.cast<float>(), unit(normal_sum(*place.cell), cluster.normal)});
-  }
+  for (const Place* place : thinned(places))
+    cluster.points.push_back({place->position.cast<float>(), unit(normal_sum(*place->cell), cluster.normal)});
   cluster.touches_occupied = near_occupied(group.cells);
   return cluster;
 }
