@@ -11,11 +11,13 @@ namespace {
 
 using reference::Random;
 
-/// Sizes around a word, a chunk, the number that one work item scans alone (2048; 65536 on PoCL), and a second and third level of sums.
+/// Sizes around a word, a chunk, the number that one work item scans alone (16, 2048, or 65536 on PoCL), the number that a group scans
+/// (16384), and a second and third level of sums.
 std::vector<std::size_t> sizes() {
   std::vector<std::size_t> sizes = {0, 1, 15, 16, 17, 63, 64, 65, 2047, 2048, 2049};
   if (reference::small_tests()) return sizes;
-  sizes.insert(sizes.end(), {2112, 65535, 65536, 65537, 100000, 64 * 2048, 64 * 2048 + 1, 64 * 65536, 64 * 65536 + 1, 64 * 64 * 2048 + 77});
+  sizes.insert(sizes.end(), {2112, 16383, 16384, 16385, 65535, 65536, 65537, 100000, 64 * 2048, 64 * 2048 + 1, 64 * 65536, 64 * 65536 + 1,
+                             64 * 64 * 2048 + 77});
   return sizes;
 }
 

@@ -130,7 +130,7 @@ void check(const CameraSetup& camera, const MakeSurfels& make_surfels, double ca
   SCOPED_TRACE(camera.name);
   std::optional<reference::SignField> expected;
   for (Commands* commands : {&test_commands(), &other_commands()}) {
-    SCOPED_TRACE(commands->device().is_cpu ? "one work item per tile" : "64 work items per tile");
+    SCOPED_TRACE(commands->shape().heavy_group == 1 ? "one work item per tile" : "64 work items per tile");
     Random random(1);
     FrameFixture fixture(camera.config, *commands);
     ViewSurfels view_surfels(*commands, fixture.lists());

@@ -67,6 +67,40 @@ __kernel void scan_few(__global uint* values, const uint count) {
   values[count] = too_large ? UINT_MAX : sum;
 }
 
+// One work-group does all, for some thousand values: they come in rounds, and each work item has SCAN_STRIP neighbours of a round. Where
+// there are many work items this takes as long as scan_few for some dozen values.
+//   i/o values[count + 1]: the last becomes the total
+__kernel void scan_by_group(__global uint* values, const uint count) {
+  __local ulong sums[MOST_SCAN_ITEMS];
+  const uint item = get_local_id(0), items = get_local_size(0);
+  ulong before = 0;  // sum of the rounds before; of 64 bits, so that a total that does not fit is noticed
+  for (uint round = 0; round < count; round += SCAN_STRIP * items) {
+    const uint first = round + SCAN_STRIP * item;
+    uint own[SCAN_STRIP];
+    ulong sum = 0;
+    for (uint n = 0; n < SCAN_STRIP; ++n) {
+      own[n] = first + n < count ? values[first + n] : 0;
+      sum += own[n];
+    }
+    sums[item] = sum;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint step = 1; step < items; step *= 2) {
+      const ulong of_others = item >= step ? sums[item - step] : 0;
+      barrier(CLK_LOCAL_MEM_FENCE);
+      sums[item] += of_others;
+      barrier(CLK_LOCAL_MEM_FENCE);
+    }
+    ulong at = before + sums[item] - sum;
+    for (uint n = 0; n < SCAN_STRIP && first + n < count; ++n) {
+      values[first + n] = (uint)at;
+      at += own[n];
+    }
+    before += sums[items - 1];
+    barrier(CLK_LOCAL_MEM_FENCE);  // the sums are read before the next round
+  }
+  if (item == 0) values[count] = (uint)min(before, (ulong)UINT_MAX);
+}
+
 // One work item handles a chunk of WORD_CHUNK words: it lists their set bits.
 //   in  words[count];  offsets[chunks]: prefix sum of count_bits';   out list: the numbers 64 n + bit of set bits
 __kernel void list_bits(__global const ulong* words, const uint count, __global const uint* offsets, __global uint* list) {

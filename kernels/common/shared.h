@@ -23,7 +23,7 @@ namespace frontier_surfels {
 #define VIEW_TILE 8
 #define VIEW_TILE_K 16
 
-// Rows of the grid that one work item observes.
+// Rows of the grid that one work item observes. On a device that wants many work items each has half a word of one column.
 #define SPACE_ROWS 8
 
 // The tables of a camera have rows of voxels that are filled up to whole chunks of this size.
@@ -35,6 +35,10 @@ namespace frontier_surfels {
 // Elements that one work item adds up in a prefix sum.
 #define SCAN_CHUNK 64
 
+// Elements that a work item of a group that makes a prefix sum has in each round, and the most work items of such a group.
+#define SCAN_STRIP 4
+#define MOST_SCAN_ITEMS 256
+
 // Words whose set bits one work item lists.
 #define WORD_CHUNK 16
 
@@ -43,9 +47,6 @@ namespace frontier_surfels {
 
 // Number of work items in the groups that go through the pages in view. A group has one or several pages.
 #define PAGE_GROUP 64
-
-// Work items that sort new surfels by block, each its share.
-#define SORT_CHUNKS 64
 
 // Kept views ----------------------------------------------------------------------------------------------------------------------------
 

@@ -12,24 +12,26 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
   if (n < count) list[n] = PAGE_SLOTS * pages[list[n] / PAGE_SLOTS] + list[n] % PAGE_SLOTS;
 }
 
-INLINE uint chunk_begin(uint count, uint chunk) { return (uint)((ulong)count * chunk / SORT_CHUNKS); }
+INLINE uint chunk_begin(uint count, uint chunk, uint chunks) { return (uint)((ulong)count * chunk / chunks); }
 
 // One work item handles a chunk of the new surfels.
-//   in  new_cells[count];   i/o histogram[cells][SORT_CHUNKS]: before: 0; after: how many of each chunk go to each cell
-__kernel void count_cells(__global const uint* new_cells, const uint count, __global uint* histogram) {
+//   in  new_cells[count];   i/o histogram[cells][chunks]: before: 0; after: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, const uint count, const uint chunks, __global uint* histogram) {
   const uint chunk = get_global_id(0);
-  if (chunk >= SORT_CHUNKS) return;
-  for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n) ++histogram[SORT_CHUNKS * new_cells[n] + chunk];
+  if (chunk >= chunks) return;
+  for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
+    ++histogram[chunks * new_cells[n] + chunk];
 }
 
 // One work item handles a chunk of the new surfels.
 //   in  new_cells[count];   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends
 //   out order[count]: new surfels sorted by cell
-__kernel void sort_by_cell(__global const uint* new_cells, const uint count, __global uint* histogram, __global uint* order) {
+__kernel void sort_by_cell(__global const uint* new_cells, const uint count, const uint chunks, __global uint* histogram,
+                           __global uint* order) {
   const uint chunk = get_global_id(0);
-  if (chunk >= SORT_CHUNKS) return;
-  for (uint n = chunk_begin(count, chunk); n < chunk_begin(count, chunk + 1); ++n)
-    order[histogram[SORT_CHUNKS * new_cells[n] + chunk]++] = n;
+  if (chunk >= chunks) return;
+  for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
+    order[histogram[chunks * new_cells[n] + chunk]++] = n;
 }
 
 // One work item handles a page: it counts its free slots.
@@ -47,12 +49,12 @@ INLINE uint missing_pages(uint wanted, uint there) { return wanted > there ? (wa
 //       free_before: prefix sum of count_free's, with the total behind it
 //   out cell_begin[cells + 1]: where each cell's new surfels begin when sorted;  missing[cells]: pages that its block needs in addition
 __kernel void begin_cells(__global const uint* histogram, __global const uint* cell_pages, __global const uint* free_before,
-                          const uint cells, __global uint* cell_begin, __global uint* missing) {
+                          const uint cells, const uint chunks, __global uint* cell_begin, __global uint* missing) {
   const uint cell = get_global_id(0);
   if (cell > cells) return;
-  cell_begin[cell] = histogram[SORT_CHUNKS * cell];
+  cell_begin[cell] = histogram[chunks * cell];
   if (cell == cells) return;
-  const uint wanted = histogram[SORT_CHUNKS * (cell + 1)] - histogram[SORT_CHUNKS * cell],
+  const uint wanted = histogram[chunks * (cell + 1)] - histogram[chunks * cell],
              there = free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]];
   missing[cell] = missing_pages(wanted, there);
 }
@@ -81,7 +83,26 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
         missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
 }
 
-// One work item handles a page of the window: its free slots take their share of the cell's new surfels.
+// The first of a cell's new surfels, in their order by cell, that page n of the window's list may take.
+INLINE uint first_of_page(uint n, uint cell, uint known, __global const uint* new_ranks, __global const uint* cell_begin,
+                          __global const uint* cell_pages, __global const uint* free_before) {
+  const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
+  return cell_begin[cell] + before - free_before[cell_pages[cell]];
+}
+
+// Notes which slots of a page have been filled.
+INLINE void note_filled(const Window* window, uint page, uint cell, ulong before, ulong filled, __global int4* page_block,
+                        __global ulong* alive, __global ulong* changed, __global ulong* taken) {
+  if (filled == 0) return;
+  const int3 place = (int3)(cell % window->size_x, cell / window->size_x % window->size_y, cell / window->size_x / window->size_y);
+  page_block[page].xyz = (int3)(window->origin_x, window->origin_y, window->origin_z) + place;
+  alive[page] |= filled;
+  changed[page] |= filled;
+  taken[page] = before | filled;
+}
+
+// The free slots of the window's pages take their share of the cell's new surfels. One work item handles a page; at width 1 a work-group
+// has a page, and a work item a slot.
 //   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
 //       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
 //   i/o page_block, alive, changed, surfels: the map;  taken: may be the same buffer as `alive`
@@ -90,24 +111,29 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
                          __global ulong* taken, __global uint4* surfels) {
-  const uint n = get_global_id(0);
+  const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0), known = count - new_count;
   if (n >= count) return;
-  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1], known = count - new_count;
-  const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
-  uint at = cell_begin[cell] + before - free_before[cell_pages[cell]];
-  const ulong before_this = n < known ? taken[page] : 0;  // added pages are free, whatever they have been before
+  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
+  const uint first = first_of_page(n, cell, known, new_ranks, cell_begin, cell_pages, free_before);
+  const ulong before = n < known ? taken[page] : 0;  // added pages are free, whatever they have been before
+#if LANES == 1
+  __local SharedWord filled;
+  const uint slot = get_local_id(0), at = first + (uint)popcount(~before & ((1ul << slot) - 1));
+  const bool fills = (before >> slot & 1) == 0 && at < end;
+  if (fills) surfels[PAGE_SLOTS * page + slot] = new_surfels[order[at]];
+  share_lane_bits(fills ? 1 : 0, (int)slot, &filled);
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+  if (slot == 0) note_filled(&window, page, cell, before, read_shared_word(&filled), page_block, alive, changed, taken);
+#else
   ulong filled = 0;
-  for (ulong left = ~before_this; left != 0 && at < end; left &= left - 1, ++at) {
+  uint at = first;
+  for (ulong left = ~before; left != 0 && at < end; left &= left - 1, ++at) {
     const uint bit = (uint)lowest_bit(left);
     surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
     filled |= 1ul << bit;
   }
-  if (filled == 0) return;
-  const int3 place = (int3)(cell % window.size_x, cell / window.size_x % window.size_y, cell / window.size_x / window.size_y);
-  page_block[page].xyz = (int3)(window.origin_x, window.origin_y, window.origin_z) + place;
-  alive[page] |= filled;
-  changed[page] |= filled;
-  taken[page] = before_this | filled;
+  note_filled(&window, page, cell, before, filled, page_block, alive, changed, taken);
+#endif
 }
 
 // One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved.
@@ -118,7 +144,8 @@ __kernel void reserve_slots(const uint count, __global const int4* page_block, _
   if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page];
 }
 
-// One work item handles a page of the window: it keeps what the frame may overwrite next. Called again before more is overwritten.
+// What the frame may overwrite next is kept. Called again before more is overwritten. One work item handles a page of the window; at width
+// 1 a work-group has a page, and a work item a slot.
 //   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
 //       page_block, alive, taken, changed, surfels: the map; surfels marked as changed may be overwritten, too
 //       room: number of surfels that can be kept
@@ -130,24 +157,40 @@ __kernel void back_up_pages(__global const uint* pages, const uint count, const 
                             __global const ulong* changed, __global const uint4* surfels, const uint room, __global uint* kept_pages,
                             __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_taken, __global ulong* kept_slots,
                             __global uint* kept_count, __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
-  const uint n = get_global_id(0);
+  const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
-  if (first) {
+  const ulong at_first = first ? alive[page] : kept_alive[n], before = first ? 0 : kept_slots[n];
+  const ulong slots = at_first & ~before & (freed[n] | changed[page]);
+#if LANES == 1
+  __local uint begin;
+  const uint slot = get_local_id(0);
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);  // all have read kept_slots
+  if (slot == 0) begin = slots != 0 ? atomic_add(kept_count, (uint)popcount(slots)) : 0;
+#else
+  const uint slot = 0;
+#endif
+  if (slot == 0 && first) {
     kept_pages[n] = page;
     kept_frames[n] = page_block[page].w;
-    kept_alive[n] = alive[page];
+    kept_alive[n] = at_first;
     kept_taken[n] = taken[page];
-    kept_slots[n] = 0;
   }
-  const ulong slots = kept_alive[n] & ~kept_slots[n] & (freed[n] | changed[page]);
+  if (slot == 0 && (first || slots != 0)) kept_slots[n] = before | slots;
+#if LANES == 1
+  barrier(CLK_LOCAL_MEM_FENCE);
+  const uint place = begin + (uint)popcount(slots & ((1ul << slot) - 1));
+  if ((slots >> slot & 1) == 0 || place >= room) return;
+  kept_surfel_slots[place] = PAGE_SLOTS * page + slot;
+  kept_surfels[place] = surfels[PAGE_SLOTS * page + slot];
+#else
   if (slots == 0) return;
-  kept_slots[n] |= slots;
   uint at = atomic_add(kept_count, (uint)popcount(slots));
   for (ulong left = slots; left != 0 && at < room; left &= left - 1, ++at) {
     kept_surfel_slots[at] = PAGE_SLOTS * page + (uint)lowest_bit(left);
     kept_surfels[at] = surfels[kept_surfel_slots[at]];
   }
+#endif
 }
 
 // One work item handles a page that back_up_pages has kept, after the frame has failed.

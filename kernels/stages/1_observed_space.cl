@@ -35,18 +35,18 @@ INLINE uintv pixel_bits(uintv range, int first) {
   return bits_below(clamp(to, 0, 32)) & ~bits_below(clamp(from, 0, 32));
 }
 
-// The cuboid's share of 32 layers of LANES x SPACE_ROWS columns: a voxel is observed iff there is a valid pixel in a fixed rectangle of the
-// image. Valid pixels of a rectangle's rows are joined, a bit for each column of pixels, for all voxels of a row of the grid at once.
-//   i, j: the first of the columns;   i/o observed[SPACE_ROWS]: bits of the layers
+// The cuboid's share of 32 layers of LANES x `row_count` columns: a voxel is observed iff there is a valid pixel in a fixed rectangle of
+// the image. Valid pixels of a rectangle's rows are joined, a bit for each column of pixels, for all voxels of a row of the grid at once.
+//   i, j: the first of the columns;   i/o observed[row_count]: bits of the layers
 INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global const uint* pixels_i, __global const ushort2* pixels_j,
-                           __global const ushort2* words_i, int i, int j, int first_layer, uintv* observed) {
+                           __global const ushort2* words_i, int i, int j, int row_count, int first_layer, uintv* observed) {
   const int chunks_i = (g->size_i + TABLE_CHUNK - 1) / TABLE_CHUNK, chunks_j = (g->size_j + TABLE_CHUNK - 1) / TABLE_CHUNK;
   for (int k = first_layer; k < first_layer + 32; ++k) {
     const ushort2 words = words_i[k * chunks_i + i / TABLE_CHUNK];
     for (int word = words.x; word < words.y; ++word) {
       const uintv columns = pixel_bits(vloadv(0, pixels_i + k * chunks_i * TABLE_CHUNK + i), 32 * word);
       if (!any_lane(MARK(columns != 0u))) continue;
-      for (int n = 0; n < SPACE_ROWS; ++n) {
+      for (int n = 0; n < row_count; ++n) {
         const ushort2 rows = pixels_j[k * chunks_j * TABLE_CHUNK + j + n];
         uint joined = 0;
         for (int row = rows.x; row < rows.y; ++row) joined |= valid[row * image_words(g) + word];
@@ -71,13 +71,27 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
 }
 
 // One work item handles LANES x SPACE_ROWS columns and a word of their layers; work item (row * words_k + w) * chunks_of(size_i) + chunk
-// has the columns from (LANES chunk, SPACE_ROWS row).
+// has the columns from (LANES chunk, SPACE_ROWS row). At width 1 it handles half a word of a column; work item (j 2 words_k + half) size_i
+// + i.
 //   in  column_end, valid: of column_ends
 //       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: for each voxel along i, along j,
 //         first and one past the last column, row of pixels whose samples lie there, as 16-bit halves
 //       words_i[layers][chunks]: for each chunk of pixels_i, first and one past the last word of 32 pixels that its columns lie in
 //       These tables have the cuboid's layers, filled up to whole words, and voxels filled up to whole chunks of TABLE_CHUNK.
 //   out observed: bit field
+#if LANES == 1
+__kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
+                             __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
+  const int parts = 2 * f.grid.words_k, i = get_global_id(0) % f.grid.size_i, part = get_global_id(0) / f.grid.size_i % parts,
+            j = get_global_id(0) / f.grid.size_i / parts;
+  if (j >= f.grid.size_j) return;
+  uint bits = 0;
+  if (32 * part < f.grid.first_pyramid_layer) observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 1, 32 * part, &bits);
+  bits |= observe_pyramid(&f.grid, ends_of_columns(&f.grid, column_end, i, j), 32 * part);
+  bits &= (uint)(valid_layers(&f.grid, part / 2) >> (32 * (part % 2)));
+  ((__global uint*)observed)[2 * word_index(&f.grid, i, j, part / 2) + part % 2] = bits;
+}
+#else
 __kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
   const int chunks = chunks_of(f.grid.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % f.grid.words_k,
@@ -86,8 +100,8 @@ __kernel void observed_space(const Frame f, __global const int* column_end, __gl
   uintv low[SPACE_ROWS], high[SPACE_ROWS];
   for (int n = 0; n < SPACE_ROWS; ++n) low[n] = high[n] = 0;
   if (64 * w < f.grid.first_pyramid_layer) {
-    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 64 * w, low);
-    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 64 * w + 32, high);
+    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w, low);
+    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w + 32, high);
   }
   for (int n = 0; n < SPACE_ROWS && j + n < f.grid.size_j; ++n) {
     const intv ends = ends_of_columns(&f.grid, column_end, i, j + n);
@@ -97,6 +111,7 @@ __kernel void observed_space(const Frame f, __global const int* column_end, __gl
     store_first(words, f.grid.size_i - i, observed + word_index(&f.grid, i, j + n, w));
   }
 }
+#endif
 
 // Which points lie at the measured surface that ended their pixel's column, or at most `surface_depth` [m] behind it?
 //   v, z: voxels and depths of the points;  depth, column_end: of all pixels;   out pixel: theirs, 0 beside the image

@@ -186,7 +186,7 @@ void SeenPoints::send_entries(const char* stage) {
   }
   if (tables_.size() > sent_tables_) {
     tables_on_device_.grow(tables_.size(), sent_tables_);
-    tables_on_device_.write(std::vector<cl_int>(tables_.begin() + sent_tables_, tables_.end()), sent_tables_);
+    tables_on_device_.send(std::vector<cl_int>(tables_.begin() + sent_tables_, tables_.end()), sent_tables_);
     sent_tables_ = tables_.size();
   }
   if (!new_bricks_.empty()) {

@@ -16,7 +16,6 @@ constexpr std::size_t kGathered = 1 << 14;         // pages that are copied to t
 constexpr std::size_t kGatheredSurfels = 1 << 15;  // surfels that are copied to the host at a time: few enough for the cache
 constexpr std::size_t kSpare = 16;                 // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
                                                    // costs nothing there until it is touched
-constexpr std::size_t kMaxSortedAlone = 1 << 14;   // surfels that one work item sorts faster than several launches do, on PoCL
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -161,14 +160,15 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   cell_begin_.resize(cell_count + 1);
   missing_.resize(cell_count);
   order_.resize(count);
-  if (commands_.device().prefers_one_item && count <= kMaxSortedAlone)
+  if (count <= commands_.shape().sort_alone)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
                   taken(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else
     sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
   add_pages(missing_.read(cell_count));
 
-  commands_.run(stage, "fill_pages", window_pages(), kGroup, window_.window(), pages_list_(), page_cells_list_(),
+  const std::size_t items = window_pages() * (commands_.shape().many_items ? PAGE_SLOTS : 1);
+  commands_.run(stage, "fill_pages", items, PAGE_GROUP, window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
                 cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), taken(), surfels_());
   size_ += count;
@@ -176,17 +176,18 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
 
 void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count) {
   const auto pages = static_cast<cl_uint>(window_pages());
-  const std::size_t bins = SORT_CHUNKS * static_cast<std::size_t>(cell_count);
+  const std::size_t bins = commands_.shape().sort_chunks * cell_count, group = commands_.shape().sort_group;
+  const auto chunks = static_cast<cl_uint>(commands_.shape().sort_chunks);
   histogram_.resize(bins + 1);
   histogram_.fill(stage, 0, bins);
-  commands_.run(stage, "count_cells", SORT_CHUNKS, 1, cells(), count, histogram_());
+  commands_.run(stage, "count_cells", chunks, group, cells(), count, chunks, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
   commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, taken(), free_before_());
   lists_.prefix_sums(stage, free_before_, pages);
-  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, cell_begin_(),
-                missing_());
-  commands_.run(stage, "sort_by_cell", SORT_CHUNKS, 1, cells(), count, histogram_(), order_());
+  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, chunks,
+                cell_begin_(), missing_());
+  commands_.run(stage, "sort_by_cell", chunks, group, cells(), count, chunks, histogram_(), order_());
 }
 
 /// Appends new pages to the window. @param missing  number of new pages for each cell
@@ -211,8 +212,9 @@ void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
   empty_.resize(count + 1);
   commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changed_words_(),
                 empty_());
-  frame_changes_ = logs_changes_ ? changed_words_.read(count) : std::vector<cl_ulong>();
-  const std::vector<cl_uchar> empty = empty_.read(count);
+  const auto changes = changed_words_.read_later(logs_changes_ ? count : 0);
+  const std::vector<cl_uchar> empty = empty_.read(count);  // waits for both, and for the whole frame
+  frame_changes_ = *changes;
   empty_pages_.clear();
   for (cl_uint n = 0; n < count; ++n)
     if (empty[n]) empty_pages_.push_back(n);

@@ -1,6 +1,7 @@
 /// What makes a frame all or nothing: a backup of what it overwrites, its end, which cannot fail, and the way back.
 #include <algorithm>
 
+#include "common/shared.h"
 #include "map/surfel_map.hpp"
 
 namespace frontier_surfels {
@@ -43,7 +44,8 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
     kept_count_.resize(1);
     kept_count_.fill(stage, 0, 1);
   }
-  commands_.run(stage, "back_up_pages", count, kGroup, pages_list_(), static_cast<cl_uint>(count), static_cast<cl_int>(first), freed(),
+  const std::size_t items = count * (commands_.shape().many_items ? PAGE_SLOTS : 1);
+  commands_.run(stage, "back_up_pages", items, PAGE_GROUP, pages_list_(), static_cast<cl_uint>(count), static_cast<cl_int>(first), freed(),
                 page_block_(), alive_(), taken(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room), kept_pages_(), kept_frames_(),
                 kept_alive_(), kept_taken_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
   undo_.kept_pages = count;
@@ -94,6 +96,7 @@ void SurfelMap::restore() {
   }
   for (const auto& [page, alive] : undo_.dropped) alive_.write({alive}, page);
   for (const auto& [block, page] : undo_.new_pages) alive_.write({0}, page);
+  commands_.wait();  // nothing of the failed frame may still run when its values go
   commands_.forget_times();
 }
 

@@ -133,7 +133,7 @@ void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
     views.set_current(working_image_of(view), view.T_world_camera);
     views.keep();
     remember_forgotten();
-    commands.forget_times();
+    commands.wait();  // so that not all images are kept at once
   }
   if (config.seen_points) seen.warn_of_spacing(config.seen_spacing, &warnings);
 }

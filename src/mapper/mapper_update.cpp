@@ -11,8 +11,8 @@ namespace frontier_surfels {
 
 using Clock = std::chrono::steady_clock;
 
-/// What each call that uses the map begins with. It forgets the times of earlier calls, which would pile up without frames, and undoes a
-/// failed frame that could not be undone at once.
+/// What each call that uses the map begins with. It does not wait for the device. It forgets the times of earlier calls, which would pile
+/// up without frames, and undoes a failed frame that could not be undone at once.
 void Mapper::Impl::begin_call() {
   commands.forget_times();
   map.roll_back();
@@ -58,12 +58,17 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Observed space C~ - 3.3, eq. (9)-(11)
   observed.compute(frame, camera);
 
-  // Taking back - ours: space behind measured surfaces that stand where space was known becomes unknown again
-  report.taken_back = taking_back.update(camera, map.window(), image, views, seen, &frame);
+  // Taking back - ours: is there evidence that space behind measured surfaces, which was known, is unknown again?
+  taking_back.look(camera, views, seen, &frame);
 
   // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
   // surviving surfel needs no new one
   SurfelVisit::Found found = visit_surfels(frame, camera);
+
+  // Space is taken back. That is rare, and only then the visit depends on it: so the visit is not kept waiting for the evidence, and is
+  // repeated where it should have been. The surfels that it has marked for labels too many then leave the map, which marks them as well
+  report.taken_back = taking_back.update(camera, map.window(), image, views, seen, &frame);
+  if (frame.takes_back) found = visit_surfels(frame, camera);
   report.in_view = found.in_view;
 
   // Surfels that are too large for this view are split - 3.4. Then the smaller ones are visited

@@ -59,11 +59,12 @@ void retire(const cl::CommandQueue& queue, const Device& device) {
 
 std::string build_options(const Device& device) {
   return std::string("-cl-std=CL1.2 -Werror") + rounding_option(device) + " -DLANES=" + std::to_string(device.lanes) +
-         (device.is_cpu ? " -DON_CPU -DSIGN_FIELD_GROUP=1" : " -DSIGN_FIELD_GROUP=64");
+         (device.is_cpu ? " -DON_CPU" : "") + " -DSIGN_FIELD_GROUP=" + std::to_string(shape_for(device).heavy_group);
 }
 
 Commands::Commands(Device device) : device_(std::move(device)) {
   try {
+    shape_ = shape_for(device_);
     queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
     max_buffer_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     std::vector<cl::Kernel> kernels;
@@ -76,26 +77,22 @@ Commands::Commands(Device device) : device_(std::move(device)) {
 
 Commands::~Commands() {
   try {
-    finish();  // commands of a failed frame may still read the kept values
+    wait();  // commands of a failed frame may still read the kept values
   } catch (const cl::Error&) {
     // The device is lost, so no command reads them any more.
   }
   retire(queue_, device_);
 }
 
-void Commands::finish() {
-  FaultInjection::step("clFinish");
+void Commands::wait() {
+  if (!pending_) return;
+  FaultInjection::step(Call::kWait, "clFinish");
   queue_.finish();
-  kept_.clear();
-}
-
-void Commands::forget_times() {
-  finish();
-  events_.clear();
+  waited();
 }
 
 std::vector<StageTime> Commands::take_times() {
-  finish();
+  wait();
   std::vector<StageTime> times;
   for (const auto& [stage, event] : events_) {
     auto found = std::find_if(times.begin(), times.end(), [&name = stage](const StageTime& time) { return time.name == name; });
@@ -110,7 +107,7 @@ cl::Buffer Commands::allocate(std::size_t bytes) {
   if (bytes > max_buffer_bytes_)
     throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
                       std::to_string(max_buffer_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
-  FaultInjection::step("clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
+  FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
   return device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
                                                   : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
 }

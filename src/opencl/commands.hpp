@@ -11,6 +11,7 @@
 #include "frontier_surfels/types.hpp"
 #include "opencl/device.hpp"
 #include "opencl/fault_injection.hpp"
+#include "opencl/work_shape.hpp"
 
 namespace frontier_surfels {
 
@@ -26,12 +27,14 @@ class Commands {
   Commands& operator=(const Commands&) = delete;
 
   const Device& device() const { return device_; }
+  const WorkShape& shape() const { return shape_; }
   std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
   std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
 
   /// The queue, for one command.
-  cl::CommandQueue& queue() {
-    FaultInjection::step("clEnqueue");
+  cl::CommandQueue& queue(Call kind = Call::kLaunch) {
+    FaultInjection::step(kind, "clEnqueue");
+    pending_ = true;
     return queue_;
   }
 
@@ -50,14 +53,23 @@ class Commands {
 
   void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }  ///< counts its time towards `stage`
 
-  /// Waits for all launches and releases the values kept for them.
+  /// Called after a read that has waited for the device: commands run in their order, so all others have ended as well.
+  void waited() {
+    pending_ = false;
+    kept_.clear();
+  }
+
+  /// Waits for all commands, if some may still run, and releases the values kept for them.
+  void wait();
+
+  /// The same.
   /// @return device time of each stage since the last call, in the order of their first launch
   std::vector<StageTime> take_times();
 
-  /// As take_times(), but drops the times.
-  void forget_times();
+  /// Drops the times, without waiting.
+  void forget_times() { events_.clear(); }
 
-  /// Keeps values that a command reads alive until take_times() or forget_times().
+  /// Keeps values that a command reads or writes alive until the host has waited for it.
   void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
   std::size_t max_buffer_bytes() const { return max_buffer_bytes_; }  ///< limit of the device for one buffer
@@ -69,14 +81,14 @@ class Commands {
   std::size_t allocated_bytes() const { return allocated_bytes_; }
 
  private:
-  void finish();  ///< waits for all launches and releases the values kept for them
-
   Device device_;
+  WorkShape shape_;
   cl::CommandQueue queue_;
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
   std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0;
+  bool pending_ = false;  ///< commands may still run
 };
 
 /// A device buffer of T that grows and never shrinks.
@@ -114,8 +126,9 @@ class DeviceArray {
   void widen_rows(std::size_t rows, std::size_t kept, std::size_t old_width, std::size_t width) {
     const cl::Buffer bigger = commands_->allocate(rows * width * sizeof(T));
     if (kept > 0 && old_width > 0)
-      commands_->queue().enqueueCopyBufferRect(buffer_, bigger, {0, 0, 0}, {0, 0, 0}, {old_width * sizeof(T), kept, 1},
-                                               old_width * sizeof(T), 0, width * sizeof(T), 0);
+      commands_->queue(Call::kCopy)
+          .enqueueCopyBufferRect(buffer_, bigger, {0, 0, 0}, {0, 0, 0}, {old_width * sizeof(T), kept, 1}, old_width * sizeof(T), 0,
+                                 width * sizeof(T), 0);
     replace(bigger, rows * width);
   }
 
@@ -123,7 +136,9 @@ class DeviceArray {
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
-    commands_->queue().enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
+    FaultInjection::waits();
+    commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
+    commands_->waited();
   }
 
   /// As write(), but does not wait for the device.
@@ -132,12 +147,23 @@ class DeviceArray {
     grow(offset + values.size(), offset);
     const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
     commands_->keep(kept);
-    commands_->queue().enqueueWriteBuffer(buffer_, CL_FALSE, offset * sizeof(T), kept->size() * sizeof(T), kept->data());
+    commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_FALSE, offset * sizeof(T), kept->size() * sizeof(T), kept->data());
   }
 
   std::vector<T> read(std::size_t size, std::size_t offset = 0) const {
     std::vector<T> values(size);
-    if (size > 0) commands_->queue().enqueueReadBuffer(buffer_, CL_TRUE, offset * sizeof(T), size * sizeof(T), values.data());
+    if (size == 0) return values;
+    FaultInjection::waits();
+    commands_->queue(Call::kRead).enqueueReadBuffer(buffer_, CL_TRUE, offset * sizeof(T), size * sizeof(T), values.data());
+    commands_->waited();
+    return values;
+  }
+
+  /// As read(), but does not wait: the values are there after the next command that does.
+  std::shared_ptr<const std::vector<T>> read_later(std::size_t size) const {
+    const auto values = std::make_shared<std::vector<T>>(size);
+    commands_->keep(values);
+    if (size > 0) commands_->queue(Call::kRead).enqueueReadBuffer(buffer_, CL_FALSE, 0, size * sizeof(T), values->data());
     return values;
   }
 
@@ -156,7 +182,7 @@ class DeviceArray {
 
   cl::Buffer enlarged(std::size_t size, std::size_t kept) const {
     const cl::Buffer bigger = commands_->allocate(size * sizeof(T));
-    if (kept > 0) commands_->queue().enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
+    if (kept > 0) commands_->queue(Call::kCopy).enqueueCopyBuffer(buffer_, bigger, 0, 0, kept * sizeof(T));
     return bigger;
   }
 
@@ -169,7 +195,7 @@ class DeviceArray {
 
   void fill(const char* stage, const cl::Buffer& buffer, T value, std::size_t size, std::size_t offset) {
     cl::Event event;
-    commands_->queue().enqueueFillBuffer(buffer, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
+    commands_->queue(Call::kFill).enqueueFillBuffer(buffer, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
     commands_->note(stage, event);
   }
 
@@ -194,7 +220,7 @@ class SentArray {
     auto shared = std::make_shared<std::vector<T>>(std::move(values));
     commands_->keep(shared);
     commands_->keep(shared_);  // running kernels may still read the values sent before
-    FaultInjection::step("clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
+    FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
     buffer_ = cl::Buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, shared->size() * sizeof(T), shared->data());
     commands_->release(shared_bytes());
     shared_ = std::move(shared);

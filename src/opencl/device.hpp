@@ -15,9 +15,6 @@ struct Device {
                                   ///< ends loops after 65535 turns
   bool shares_memory = false;     ///< the device works in the host's memory
   std::string description;        ///< platform, name and compute units
-
-  /// Group size for kernels with much work per item. 1 on a CPU: it runs the items of a group one after the other on one core.
-  std::size_t heavy_group() const { return is_cpu ? 1 : 64; }
 };
 
 /// Chooses the device by platform, device_type, device_index and threads of the configuration, and the lanes of its work items.

@@ -8,16 +8,12 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-// Below these sizes one work item alone is faster than one more launch, or for words two more.
-constexpr std::size_t kMaxScannedAlone = 2048, kMaxScannedAloneOnPocl = 65536;  // values
-constexpr std::size_t kMaxListedAlone = 1 << 18;                                // words, on PoCL
-constexpr std::size_t kInitialRoom = 1 << 14;                                   // elements of a list
+constexpr std::size_t kInitialRoom = 1 << 14;  // elements of a list
 
 }  // namespace
 
 Lists::Lists(Commands& commands)
     : commands_(commands),
-      max_scanned_alone_(commands.device().prefers_one_item ? kMaxScannedAloneOnPocl : kMaxScannedAlone),
       counts_(commands),
       levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
               DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
@@ -34,10 +30,9 @@ std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::
 
 void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level) {
   const auto n = static_cast<cl_uint>(count);
-  if (count <= max_scanned_alone_) {
-    commands_.run(stage, "scan_few", 1, 1, values(), n);
-    return;
-  }
+  const WorkShape& shape = commands_.shape();
+  if (count <= shape.scan_alone) return commands_.run(stage, "scan_few", 1, 1, values(), n);
+  if (count <= shape.scan_by_group) return commands_.run(stage, "scan_by_group", shape.scan_group, shape.scan_group, values(), n);
   DeviceArray<cl_uint>& sums = levels_[level];
   const std::size_t chunks = (count + SCAN_CHUNK - 1) / SCAN_CHUNK;
   sums.resize(chunks + 1);
@@ -50,7 +45,7 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
   if (count == 0) return 0;
   const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
   const auto words = static_cast<cl_uint>(count);
-  if (commands_.device().prefers_one_item && count <= kMaxListedAlone) return list_few_bits(stage, bits, words, list);
+  if (count <= commands_.shape().list_alone) return list_few_bits(stage, bits, words, list);
   counts_.resize(chunks + 1);
   commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
   const std::uint32_t total = scan(stage, counts_, chunks);

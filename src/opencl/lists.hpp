@@ -30,7 +30,6 @@ class Lists {
   void scan_level(const char* stage, DeviceArray<cl_uint>& values, std::size_t count, std::size_t level);
 
   Commands& commands_;
-  std::size_t max_scanned_alone_;  ///< number of values up to which one work item scans alone
   DeviceArray<cl_uint> counts_;
   DeviceArray<cl_uint> levels_[5];  ///< sums of chunks, sums of chunks of these, and so on
 };

@@ -133,7 +133,7 @@ void Boundaries::look_in_cells(const std::vector<Eigen::Vector3f>& points_world,
                                const Eigen::AlignedBox3d& box, double reach, const SurfelMap& map) {
   cells_.list(box, map);
   const std::size_t stride = send_points(points_world, asked, cells_.corner_world());
-  commands_.run(kStage, "find_nearest_boundaries", commands_.chunks(asked.size()), commands_.device().heavy_group(), cells_.window(),
+  commands_.run(kStage, "find_nearest_boundaries", commands_.chunks(asked.size()), commands_.shape().heavy_group, cells_.window(),
                 cells_.cells(), static_cast<cl_float>(reach), map.surfels(), map.page_block(), cells_.entries(), cells_.begin(), points_(),
                 static_cast<cl_int>(stride), static_cast<cl_int>(asked.size()), distances_(), slots_(), sides_());
 }
@@ -158,7 +158,7 @@ void Boundaries::look_in_blocks(const std::vector<Eigen::Vector3f>& points_world
   near_begin_.send(std::move(near_begin));
   near_.send(std::move(near));
   near_squares_.send(std::move(squares));
-  commands_.run(kStage, "find_nearest_in_blocks", asked.size(), commands_.device().heavy_group(), window.window(),
+  commands_.run(kStage, "find_nearest_in_blocks", asked.size(), commands_.shape().heavy_group, window.window(),
                 static_cast<cl_float>(reach), map.surfels(), map.alive(), map.page_block(), pages_(), page_begin_(), near_begin_(), near_(),
                 near_squares_(), points_(), static_cast<cl_int>(stride), static_cast<cl_int>(asked.size()), distances_(), slots_(),
                 sides_());
@@ -187,7 +187,7 @@ std::vector<FirstSurfel> Boundaries::first_within(const std::vector<MovingBox>& 
     boxes_.send(std::move(sent));
     distances_.resize(asked.size());
     sides_.resize(asked.size());
-    commands_.run(kStage, "move_boxes", asked.size(), commands_.device().heavy_group(), cells_.window(), cells_.cells(),
+    commands_.run(kStage, "move_boxes", asked.size(), commands_.shape().heavy_group, cells_.window(), cells_.cells(),
                   static_cast<cl_int>(frontier_counts), map.surfels(), cells_.entries(), cells_.begin(), boxes_(),
                   static_cast<cl_int>(asked.size()), distances_(), sides_());
     const std::vector<float> shares = distances_.read(asked.size());

@@ -48,7 +48,7 @@ void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::ve
   table_.fill(stage, 0, workers * kTableCells);
   const auto count = static_cast<cl_uint>(list.size());
   list_.send(std::move(list));
-  commands_.run(stage, "merge_surfels", workers, commands_.device().heavy_group(), static_cast<cl_float>(map.block_size()), map.surfels(),
+  commands_.run(stage, "merge_surfels", workers, commands_.shape().heavy_group, static_cast<cl_float>(map.block_size()), map.surfels(),
                 map.alive(), pages_(), page_begin_(), static_cast<cl_uint>(pages.size()), list_(), count, static_cast<cl_uint>(workers),
                 sums_(), static_cast<cl_uint>(most_sums), table_(), merged_(), counts_());
 }

@@ -121,7 +121,7 @@ void PointStates::find_some(const std::vector<Eigen::Vector3f>& points, const st
   const int view_count = world.views.prepare(Eigen::Isometry3d(Eigen::Translation3d(corner)));
   const Frame frame = open_window(window, world);
   const SeenPoints &seen = world.seen, &taken = world.taking_back.taken();
-  commands_.run(kStage, "find_states", sorted.chunks.size(), commands_.device().heavy_group(), frame, world.views.views(),
+  commands_.run(kStage, "find_states", sorted.chunks.size(), commands_.shape().heavy_group, frame, world.views.views(),
                 world.views.view_lanes(), static_cast<cl_int>(view_count), world.views.depths(), seen.slots(), seen.tables(),
                 seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), points_(), static_cast<cl_int>(stride), chunks_(),
                 static_cast<cl_int>(sorted.chunks.size()), states_());

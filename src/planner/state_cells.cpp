@@ -82,7 +82,7 @@ void StateCells::find_free_in(const MapWindow& window, const std::vector<FreeQue
   const int view_count = world.views.prepare(Eigen::Isometry3d(Eigen::Translation3d(window.corner_world())), after);
   const Frame frame = open_window(window, world);
   const SeenPoints &seen = world.seen, &taken = world.taking_back.taken();
-  commands_.run(kStage, "find_free_cells", cubes, commands_.device().heavy_group(), frame, world.views.views(), world.views.view_lanes(),
+  commands_.run(kStage, "find_free_cells", cubes, commands_.shape().heavy_group, frame, world.views.views(), world.views.view_lanes(),
                 static_cast<cl_int>(view_count), world.views.depths(), seen.slots(), seen.tables(), seen.brick_words(), taken.slots(),
                 taken.tables(), taken.brick_words(), static_cast<cl_float>(edge / kBlockCells), blocks_(),
                 static_cast<cl_int>(questions.size()), bits_());

@@ -213,7 +213,7 @@ std::vector<ViewValue> ViewValues::find(const ViewQuestion& question, const Surf
 /// A CPU draws a view with one item, and its image stays in one core's cache; other devices need many items. The values do not depend on
 /// it.
 std::size_t ViewValues::items_per_view(std::size_t views) const {
-  const std::size_t items = commands_.device().is_cpu ? 64 : 16384;
+  const std::size_t items = commands_.shape().view_items;
   return std::clamp(items / views, std::size_t{1}, std::size_t{256});
 }
 
@@ -234,14 +234,14 @@ void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std:
   if (per_view == 1) tiles_.fill(kStage, VIEW_NOTHING, count * image_tiles);
   if (!plan.blocks.empty()) {
     blocks_.send(std::move(plan.blocks));
-    commands_.run(kStage, "draw_views", count * per_view, commands_.device().heavy_group(), camera, static_cast<cl_float>(map.block_size()),
+    commands_.run(kStage, "draw_views", count * per_view, commands_.shape().heavy_group, camera, static_cast<cl_float>(map.block_size()),
                   static_cast<cl_float>(map.largest_radius()), views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view),
                   blocks_(), blocks, map.surfels(), map.alive(), map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(),
                   merged_.counts(), images_(), static_cast<cl_uint>(image_tiles), tiles_());
   }
   areas_.resize(2 * rows);
   counts_.resize(VIEW_COUNTS * rows);
-  commands_.run(kStage, "count_views", rows, commands_.device().heavy_group(), camera, views_(), static_cast<cl_int>(count), images_(),
+  commands_.run(kStage, "count_views", rows, commands_.shape().heavy_group, camera, views_(), static_cast<cl_int>(count), images_(),
                 areas_(), counts_());
 
   const std::vector<cl_ulong> areas = areas_.read(2 * rows);

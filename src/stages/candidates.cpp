@@ -22,7 +22,7 @@ void CandidateList::list(const Frame& frame, const Camera& camera, const BitFiel
   const std::size_t chunks = commands_.chunks(count_);
   around_.resize(chunks * commands_.lanes());
   directions_.resize(chunks * 3 * commands_.lanes());
-  commands_.run(stage, "find_directions", chunks, commands_.device().heavy_group(), frame, camera.layer_depth()(), observed(), voxels_(),
+  commands_.run(stage, "find_directions", chunks, commands_.shape().heavy_group, frame, camera.layer_depth()(), observed(), voxels_(),
                 static_cast<cl_int>(count_), around_(), directions_());
 }
 

@@ -85,8 +85,8 @@ std::vector<cl_uchar> Remembering::see_points(const Window& window, const View& 
   const std::size_t cubes = seen.cubes(asked.size());
   seen_by_.send(std::move(asked));
   states_.resize(count);
-  commands_.run(kStage, "see_points", cubes, commands_.device().heavy_group(), window, view, static_cast<cl_int>(seen.shift()),
-                views.depths(), seen_by_(), count, seen.brick_words());
+  commands_.run(kStage, "see_points", cubes, commands_.shape().heavy_group, window, view, static_cast<cl_int>(seen.shift()), views.depths(),
+                seen_by_(), count, seen.brick_words());
   commands_.run(kStage, "find_brick_states", count, kGroup, seen_by_(), count, seen.brick_words(), states_());
   return states_.read(count);
 }

@@ -29,7 +29,7 @@ SignField::SignField(Commands& commands, Lists& lists)
     : commands_(commands), lists_(lists), tile_begin_(commands), tile_cursor_(commands), tile_surfels_(commands), events_(commands) {}
 
 void SignField::compute(const Frame& frame, const NeededPaths& needed, const ViewSurfels& surfels) {
-  const std::size_t tiles = sign_field_tiles(frame.grid), group = commands_.device().heavy_group();
+  const std::size_t tiles = sign_field_tiles(frame.grid), group = commands_.shape().heavy_group;
   events_.allocate(size(frame.grid));
   list_by_tiles(frame, surfels, tiles);
   commands_.run(kStage, "sign_field", tiles * group, group, frame, needed.lines()(), surfels.surfels()(), tile_begin_(), tile_surfels_(),
@@ -43,7 +43,7 @@ void SignField::list_by_tiles(const Frame& frame, const ViewSurfels& surfels, st
   tile_begin_.fill(kStage, 0, tiles + 1);
   commands_.run(kStage, "count_tiles", count, kGroup, frame, surfels.surfels()(), count, tile_begin_());
   tile_surfels_.resize(std::max<std::size_t>(lists_.scan(kStage, tile_begin_, tiles), 1));
-  commands_.queue().enqueueCopyBuffer(tile_begin_(), tile_cursor_(), 0, 0, (tiles + 1) * sizeof(cl_uint));
+  commands_.queue(Call::kCopy).enqueueCopyBuffer(tile_begin_(), tile_cursor_(), 0, 0, (tiles + 1) * sizeof(cl_uint));
   commands_.run(kStage, "fill_tiles", count, kGroup, frame, surfels.surfels()(), count, tile_cursor_(), tile_surfels_());
 }
 

@@ -62,12 +62,19 @@ void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
   if (!taken_.empty()) taken_.open_window(window);
 }
 
+void TakingBack::look(const Camera& camera, const RecentViews& views, const SeenPoints& seen, Frame* frame) {
+  strong_count_now_ = nullptr;
+  if (!is_on_) return;
+  frame->has_taken = taken_.empty() ? 0 : 1;
+  find_evidence(*frame, camera, views, seen);
+}
+
 std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
                                const SeenPoints& seen, Frame* frame) {
   if (!is_on_) return 0;
-  frame->has_taken = taken_.empty() ? 0 : 1;
+  commands_.wait();
   std::vector<cl_uchar> chosen;
-  if (find_evidence(*frame, camera, views, seen)) chosen = choose_pixels(*frame, camera, views, seen);
+  if (strong_count_now_ != nullptr && strong_count_now_->front() > 0) chosen = choose_pixels(*frame, camera, views, seen);
   const auto count = static_cast<std::size_t>(std::count(chosen.begin(), chosen.end(), 1));
   if (count == 0 && taken_.empty()) return pixels_;
   pixels_ = std::max(pixels_, count);  // before anything is changed
@@ -99,11 +106,11 @@ std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& w
   return bricks;
 }
 
-/// @return whether any of the coarse pixels has strong evidence
-bool TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
-  if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return false;
+/// Counts the coarse pixels that have strong evidence.
+void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
+  if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return;
   std::vector<View> last, older = views.views_before(last_frames_.back().number);
-  if (older.empty() && frame.has_seen == 0) return false;
+  if (older.empty() && frame.has_seen == 0) return;
   for (const LastFrame& other : last_frames_) {
     last.push_back(views.view_from_current(other.intrinsics, other.T_world_camera));
     last.back().first_pixel = static_cast<std::uint32_t>(other.room * room_size_);
@@ -118,12 +125,12 @@ bool TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
   strong_count_.resize(1);
   strong_count_.fill(kStage, 0, 1);
   weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_(), strong_count_());
-  return strong_count_.read_one(0) > 0;
+  strong_count_now_ = strong_count_.read_later(1);
 }
 
 void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
                        const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to) {
-  commands_.run(kStage, kernel, items, commands_.device().heavy_group(), frame, limits_, camera.depth()(), frame_views_(),
+  commands_.run(kStage, kernel, items, commands_.shape().heavy_group, frame, limits_, camera.depth()(), frame_views_(),
                 static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(), seen.slots(),
                 seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), from, to);
 }
@@ -223,7 +230,7 @@ void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const R
   taken_by_.send(std::move(taken_by));
   states_.resize(bricks.size());
   const cl::Buffer& chosen = has_chosen ? chosen_() : camera.depth()();  // a kernel takes no missing buffer
-  commands_.run(kStage, "take_points", taken_.cubes(bricks.size()), commands_.device().heavy_group(), frame, limits_,
+  commands_.run(kStage, "take_points", taken_.cubes(bricks.size()), commands_.shape().heavy_group, frame, limits_,
                 views.own_view_from(window.T_camera_local()), views.depths(), camera.depth()(), static_cast<cl_int>(has_chosen), chosen,
                 taken_by_(), count, taken_.brick_words());
   commands_.run(kStage, "find_brick_states", count, kGroup, taken_by_(), count, taken_.brick_words(), states_());

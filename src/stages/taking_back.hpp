@@ -7,6 +7,7 @@
 
 #include <array>
 #include <deque>
+#include <memory>
 #include <set>
 #include <utility>
 #include <vector>
@@ -30,9 +31,13 @@ class TakingBack {
   /// taken points: these would be forgotten.
   void open_window(const MapWindow& window, const SeenPoints& seen);
 
-  /// Takes space back behind the surfaces of this frame that the last frames support and that known space contradicts, and gives back what
-  /// this frame sees. After that frame->has_taken says whether any point of the window is taken, and frame->takes_back
-  /// whether this frame has taken some.
+  /// Asks whether this frame has evidence against what is known. update() needs the answer, and waits for it unless the host has waited for
+  /// the device meanwhile.
+  void look(const Camera& camera, const RecentViews& views, const SeenPoints& seen, Frame* frame);
+
+  /// To be called after look(). Takes space back behind the surfaces of this frame that the last frames support and that known space
+  /// contradicts, and gives back what this frame sees. After that frame->has_taken says whether any point of the window is taken, and
+  /// frame->takes_back whether this frame has taken some.
   /// @param seen  seen points; open_window() must have been called for both lattices
   /// @return number of pixels whose surface took space back
   /// @throws cl::Error  the device failed: what was taken back stays so, and counts for the next frame
@@ -78,7 +83,7 @@ class TakingBack {
   std::set<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
                                 const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
-  bool find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
+  void find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<Brick> bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
                                       const std::vector<cl_uchar>& chosen);
@@ -101,6 +106,7 @@ class TakingBack {
   SentArray<cl_int4> taken_by_;
   DeviceArray<cl_uchar> coarse_, evidence_, squares_, chosen_, states_;
   DeviceArray<cl_uint> strong_count_;
+  std::shared_ptr<const std::vector<cl_uint>> strong_count_now_;  ///< of this frame, if it was asked for
 };
 
 }  // namespace frontier_surfels

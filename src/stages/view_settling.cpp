@@ -7,7 +7,7 @@ namespace frontier_surfels {
 void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
                           Candidates& candidates) {
   const int count = views.prepare();
-  const std::size_t columns = tile_columns(frame.grid), group = commands_.device().heavy_group();
+  const std::size_t columns = tile_columns(frame.grid), group = commands_.shape().heavy_group;
   tile_views_.resize(std::max<std::size_t>(columns * (64 / VIEW_TILE_K) * views.view_groups(), 1));  // kernels take no empty buffer
   tile_seen_.resize(columns * (64 / VIEW_TILE_K));
   if (count == 0 && seen.empty()) return;

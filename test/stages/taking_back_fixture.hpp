@@ -100,6 +100,7 @@ class TakingBackFixture : public FrameFixture {
 
   std::size_t update() {
     told = make_frame(camera(), map().window(), views(), &seen(), limits());
+    taking.look(camera(), views(), seen(), &told);
     return taking.update(camera(), map().window(), now.image, views(), seen(), &told);
   }
 

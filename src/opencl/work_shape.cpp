@@ -1,0 +1,28 @@
+#include "opencl/work_shape.hpp"
+
+#include <algorithm>
+
+#include "common/shared.h"
+
+namespace frontier_surfels {
+
+WorkShape shape_for(const Device& device) {
+  WorkShape shape;
+  shape.many_items = device.lanes == 1;
+  shape.heavy_group = device.is_cpu ? 1 : 64;  // a CPU runs the items of a group one after the other on one core
+  shape.view_items = shape.heavy_group == 1 ? 64 : 1 << 14;
+  if (shape.many_items) {
+    shape.scan_alone = 16;
+    shape.scan_by_group = 1 << 14;
+    shape.scan_group = std::min<std::size_t>(MOST_SCAN_ITEMS, device.device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+    shape.sort_chunks = 512;
+    shape.sort_group = 64;
+  } else if (device.prefers_one_item) {
+    shape.scan_alone = 1 << 16;
+    shape.list_alone = 1 << 18;
+    shape.sort_alone = 1 << 14;
+  }
+  return shape;
+}
+
+}  // namespace frontier_surfels

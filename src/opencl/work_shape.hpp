@@ -1,0 +1,28 @@
+/// How work is cut for a device: the one place that knows what a CPU likes and what a graphics processor likes.
+#pragma once
+
+#include <cstddef>
+
+#include "opencl/device.hpp"
+
+namespace frontier_surfels {
+
+/// A CPU has few cores with wide vectors, and on PoCL one more launch, or a group's barrier, costs more than a small job done by one work
+/// item. A graphics processor wants a hundred thousand work items, a work item alone is a hundred times slower there than on a CPU, and
+/// each time the host waits the device runs dry. The results are the same, bit by bit.
+struct WorkShape {
+  bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
+  std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
+  std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
+  std::size_t scan_by_group = 0;  ///< so many by one work-group
+  std::size_t scan_group = 1;     ///< work items of this group
+  std::size_t list_alone = 0;     ///< the bits of so many words are listed by one work item
+  std::size_t sort_alone = 0;     ///< so many new surfels are sorted by one work item
+  std::size_t sort_chunks = 64;   ///< otherwise so many work items sort them by block, each its share
+  std::size_t sort_group = 1;     ///< in groups of so many
+  std::size_t view_items = 64;    ///< work items that draw planners' views at a time
+};
+
+WorkShape shape_for(const Device& device);
+
+}  // namespace frontier_surfels

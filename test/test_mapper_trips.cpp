@@ -1,0 +1,53 @@
+/// What a frame asks of the device: each time the host waits, a graphics processor runs dry, and each launch costs some microseconds. A
+/// command that is added fails here, and has to be worth it.
+#include <gtest/gtest.h>
+
+#include "mapper_input.hpp"
+#include "opencl/fault_injection.hpp"
+
+namespace frontier_surfels {
+namespace {
+
+/// Of a frame that has no forgotten view to remember.
+struct Trips {
+  std::size_t waits, launches, fills, copies, uploads;
+};
+
+Trips last_trips() {
+  const auto count = [](Call kind) { return FaultInjection::count(kind); };
+  return {count(Call::kWait), count(Call::kLaunch), count(Call::kFill), count(Call::kCopy), count(Call::kUpload)};
+}
+
+void expect_at_most(const Trips& trips, const Trips& most) {
+  EXPECT_LE(trips.waits, most.waits);
+  EXPECT_LE(trips.launches, most.launches);
+  EXPECT_LE(trips.fills, most.fills);
+  EXPECT_LE(trips.copies, most.copies);
+  EXPECT_LE(trips.uploads, most.uploads);
+}
+
+/// Frames in which surfels were split, space was taken back or blocks were added to the memory of seen points take more, and are left out.
+/// @return number of frames that were compared
+std::size_t compare(int lanes, const Trips& most) {
+  Config config = undecimated();
+  config.lanes = lanes;
+  Mapper mapper(config);
+  std::size_t compared = 0;
+  for (const auto& frame : orbit_frames(coarse_camera(), 16, 1)) {
+    FaultInjection::stop();
+    const Report report = mapper.integrate(frame.view());
+    const Trips trips = last_trips();
+    if (report.sequence <= 8 || report.split > 0 || report.taken_back > 0 || report.created == 0) continue;
+    SCOPED_TRACE("frame " + std::to_string(report.sequence) + ", lanes " + std::to_string(lanes));
+    expect_at_most(trips, most);
+    ++compared;
+  }
+  return compared;
+}
+
+TEST(MapperTrips, OfACpu) { EXPECT_GT(compare(16, {5, 25, 3, 0, 2}), 3u); }
+
+TEST(MapperTrips, OfAGraphicsProcessor) { EXPECT_GT(compare(1, {5, 60, 8, 0, 2}), 3u); }
+
+}  // namespace
+}  // namespace frontier_surfels
