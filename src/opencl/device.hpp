@@ -14,9 +14,10 @@ struct Device {
   bool prefers_one_item = false;  ///< one work item does small jobs alone, because a launch costs more on PoCL; not on llvmpipe, which
                                   ///< ends loops after 65535 turns
   bool shares_memory = false;     ///< the device works in the host's memory
-  bool keeps_programs = false;  ///< built kernels are kept as files; PoCL has a cache of its own, whose files are also tuned to group sizes
-  std::string description;      ///< platform, name and compute units
-  std::string choice;           ///< why this device was taken, for display
+  bool keeps_programs =
+      false;  ///< built kernels are kept as files; not on PoCL: it has a cache of its own, and giving out its binary took it over 40 s
+  std::string description;  ///< platform, name and compute units
+  std::string choice;       ///< why this device was taken, for display
 
   /// Group size for kernels with much work per item. 1 on a CPU: it runs the items of a group one after the other on one core.
   std::size_t heavy_group() const { return is_cpu ? 1 : 64; }
