@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 
+#include "map_file_input.hpp"
 #include "mapper_input.hpp"
 #include "opencl/fault_injection.hpp"
 
