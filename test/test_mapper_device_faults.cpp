@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 
+#include "map_file_input.hpp"
 #include "mapper_input.hpp"
 #include "opencl/fault_injection.hpp"
 
@@ -88,6 +89,8 @@ class MapperDeviceFaults : public testing::Test {
       const std::string said = refusal(*mapper, frames[at], n, 1);
       FaultInjection::stop();
       EXPECT_NE(said.find("CL_"), std::string::npos) << said;
+      EXPECT_TRUE(contains(said, "this mapper uses ") && contains(said, "of the device's ")) << said;
+      EXPECT_TRUE(contains(said, "lower z_max or recent_views")) << said;
       EXPECT_EQ(said.back(), '.') << said;
       expect_same(Seen(*mapper), before);
       if (n % 2 == 0) {  // it ends what a frame would have to
@@ -116,6 +119,20 @@ TEST_F(MapperDeviceFaults, TheFirstFrame) {
   Report wanted;
   wanted.created = 100;
   EXPECT_GT(fail_everywhere(undecimated(), orbit_frames(small_camera(), 2, 6), 0, wanted), 20u);
+}
+
+/// Out of memory: how much was needed, how much is in use, and how much there is.
+TEST_F(MapperDeviceFaults, TheNumbersAreTold) {
+  const Frames frames = orbit_frames(small_camera(), 2, 6);
+  std::string told;
+  for (std::size_t n = 0; n < 100 && told.empty(); ++n) {
+    const std::string said = refusal(*begin(undecimated(), frames, 0), frames[0], n, 1);
+    if (contains(said, "a buffer of ")) told = said;
+  }
+  EXPECT_TRUE(contains(told, "failed with CL_MEM_OBJECT_ALLOCATION_FAILURE: the device has too little free memory (a buffer of ")) << told;
+  EXPECT_TRUE(contains(told, " MiB is needed, this mapper uses ") && contains(told, " MiB of the device's ")) << told;
+  EXPECT_FALSE(contains(told, "uses 0.0 MiB") || contains(told, "device's 0.0 MiB") || contains(told, "of 0.0 MiB")) << told;
+  EXPECT_TRUE(contains(told, "raise decimation, lower z_max or recent_views, set map_folder")) << told;
 }
 
 /// With surfels that leave and come, kept views alone.

@@ -120,8 +120,11 @@ class Usage(unittest.TestCase):
         usage = run('--help')
         self.assertEqual((usage.returncode, usage.stderr), (DONE, ''))
         for option in ('--report --config --set --first --last --stride --depth-topic --info-topic --color-topic --world-frame '
-                       '--octomap-resolution --truth --no-exact --threads --sweep --live --mapper --parameters').split():
+                       '--octomap-resolution --truth --no-exact --threads --sweep --live --mapper --parameters --devices').split():
             self.assertIn(option, usage.stdout)
+        devices = run('--devices')
+        self.assertEqual((devices.returncode, devices.stderr), (DONE, ''))
+        self.assertRegex(devices.stdout, r'The default configuration takes \S.* \(.*\)\.\n$|pocl-opencl-icd')
         table = run('--parameters')
         self.assertEqual((table.returncode, table.stderr), (DONE, ''))
         self.assertIn('| `recent_view_angle` |', table.stdout)

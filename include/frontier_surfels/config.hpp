@@ -84,10 +84,13 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
     info.group = group;
     visit(info, value);
   };
-  field(FieldInfo{"platform", "", "part of the name of the OpenCL platform, in any case; empty: the first one with a suitable device"},
-        config.platform);
-  field(FieldInfo{"device_type", "", "type of the OpenCL device: any, cpu, gpu or accelerator"}, config.device_type);
-  field(FieldInfo{"device_index", "", "number of the suitable device to use, from 0", 0, 255}, config.device_index);
+  field(FieldInfo{"platform", "", "part of the name of the OpenCL platform, in any case; empty: any"}, config.platform);
+  field(FieldInfo{"device_type", "", "type of the OpenCL device: any, cpu, gpu or accelerator; any: the fastest"}, config.device_type);
+  field(FieldInfo{"device_index", "",
+                  "number of the device to use, from 0, among those that fit platform and device_type, fastest first: `replay_score "
+                  "--devices` lists them",
+                  0, 255},
+        config.device_index);
   field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
   field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 on other devices", 0, 16},
         config.lanes);

@@ -157,6 +157,9 @@ class Mapper {
   /// Platform, name and compute units of the device in use, for display.
   std::string device() const;
 
+  /// Why that device was taken, for display, for instance "fastest usable of 2: a graphics processor".
+  std::string device_choice() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

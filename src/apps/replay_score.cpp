@@ -12,6 +12,7 @@
 #include "config/config_text.hpp"
 #include "frontier_surfels/paths.hpp"
 #include "frontier_surfels/ply.hpp"
+#include "opencl/device_listing.hpp"
 #include "replay/live_replay.hpp"
 #include "replay/report_folder.hpp"
 #include "replay/report_page.hpp"
@@ -114,6 +115,13 @@ void declare_options(CLI::App& app, Options& options, RawOptions& raw) {
         throw CLI::Success();
       },
       "print all parameters, as in doc/parameters.md");
+  app.add_flag_callback(
+      "--devices",
+      [] {
+        std::cout << device_listing();
+        throw CLI::Success();
+      },
+      "list the OpenCL devices, the fastest first, with what each lacks, and the one that is used by default");
 }
 
 /// @throws CLI::ValidationError with every fault of the settings and the configuration

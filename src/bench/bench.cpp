@@ -106,7 +106,12 @@ void tell_faults(const ordered_json& sections) {
 
 void measure(const Options& options) {
   const std::vector<Input> inputs = open_inputs(options);
-  const std::string device = Mapper(options.config).device();
+  std::string device, choice;
+  {
+    const Mapper mapper(options.config);
+    device = mapper.device();
+    choice = mapper.device_choice();
+  }
   ordered_json json = {{"device", device},
                        {"processors", std::thread::hardware_concurrency()},
                        {"frames", options.frames},
@@ -119,7 +124,7 @@ void measure(const Options& options) {
   };
   write();  // fails now, rather than after hours, if the file cannot be written
   replay::catch_first_interrupt();
-  std::cout << device << std::endl;
+  std::cout << "Device: " << device << " (" << choice << ")" << std::endl;
   for (const Section& section : sections()) {
     if (!wanted(options, section) || replay::stop_requested()) continue;
     json["sections"][section.name] = section.measure(options, inputs);

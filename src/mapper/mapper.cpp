@@ -15,11 +15,11 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 Report Mapper::integrate(const DepthFrame& frame) {
-  return on_device([&] { return impl_->integrate(frame); });
+  return on_device(impl_->commands, [&] { return impl_->integrate(frame); });
 }
 
 std::vector<Surfel> Mapper::surfels() const {
-  return on_device([&] {
+  return on_device(impl_->commands, [&] {
     impl_->begin_call();
     return impl_->map.download();
   });
@@ -33,7 +33,7 @@ std::vector<Surfel> Mapper::surfels(const Eigen::AlignedBox3f& box_world) const 
 }
 
 Changes Mapper::changes(std::uint64_t since) const {
-  return on_device([&] { return impl_->changes(since); });
+  return on_device(impl_->commands, [&] { return impl_->changes(since); });
 }
 
 Changes Mapper::Impl::changes(std::uint64_t since) {
@@ -57,7 +57,7 @@ std::vector<Surfel> Mapper::whole_map() const {
 }
 
 SavedMap Mapper::saved_map() const {
-  SavedMap map = on_device([&] { return impl_->saved_map(); });
+  SavedMap map = on_device(impl_->commands, [&] { return impl_->saved_map(); });
   if (impl_->archive) impl_->archive->add_stored(map);
   if (!impl_->config.seen_points) map.seen = {};  // it lacks what this mapper has seen: let it be filled in
   return map;
@@ -75,7 +75,7 @@ void Mapper::save(const std::string& path) const { write_map(path, saved_map());
 
 void Mapper::flush() {
   if (!impl_->archive) return;
-  on_device([&] {
+  on_device(impl_->commands, [&] {
     impl_->commands.forget_times();
     impl_->archive->flush(static_cast<std::uint32_t>(impl_->sequence));
   });
@@ -96,11 +96,11 @@ void Mapper::load(const std::string& path) {
 }
 
 void Mapper::load(const std::vector<Surfel>& surfels) {
-  on_device([&] { impl_->begin_map(surfels, {}, {}); });
+  on_device(impl_->commands, [&] { impl_->begin_map(surfels, {}, {}); });
 }
 
 void Mapper::load(const SavedMap& map) {
-  on_device([&] { impl_->begin_map(map.surfels, map.seen, map.views); });
+  on_device(impl_->commands, [&] { impl_->begin_map(map.surfels, map.seen, map.views); });
 }
 
 void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels, const SeenSpace& saved_seen, const std::vector<SavedView>& saved_views) {
@@ -139,7 +139,7 @@ void Mapper::Impl::load_views(const std::vector<SavedView>& saved) {
 }
 
 void Mapper::reset() {
-  on_device([&] { impl_->begin_map({}, {}, {}); });
+  on_device(impl_->commands, [&] { impl_->begin_map({}, {}, {}); });
 }
 
 Statistics Mapper::statistics() const {
@@ -157,5 +157,6 @@ std::size_t Mapper::size_on_disk() const { return impl_->archive ? impl_->archiv
 std::uint64_t Mapper::sequence() const { return impl_->sequence; }
 const Config& Mapper::config() const { return impl_->config; }
 std::string Mapper::device() const { return impl_->commands.device().description; }
+std::string Mapper::device_choice() const { return impl_->commands.device().choice; }
 
 }  // namespace frontier_surfels

@@ -45,6 +45,16 @@ auto on_device(Work work) -> decltype(work()) {
   }
 }
 
+/// As on_device(work); errors for want of memory also tell what `commands` uses of it.
+template <typename Work>
+auto on_device(const Commands& commands, Work work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    throw_device_error(error, commands.memory_text());
+  }
+}
+
 struct Mapper::Impl {
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),

@@ -21,7 +21,7 @@ std::vector<float> clearance_of(const std::vector<SpaceState>& states, const std
 }  // namespace
 
 std::vector<SpaceState> Mapper::states(const std::vector<Eigen::Vector3f>& points_world) const {
-  return on_device([&] { return impl_->states(points_world); });
+  return on_device(impl_->commands, [&] { return impl_->states(points_world); });
 }
 
 std::vector<SpaceState> Mapper::Impl::states(const std::vector<Eigen::Vector3f>& points_world) {
@@ -35,7 +35,7 @@ std::vector<RayState> Mapper::ray_states(const std::vector<Ray>& rays_world, boo
 }
 
 std::vector<NearestBoundary> Mapper::nearest_boundaries(const std::vector<Eigen::Vector3f>& points_world, double reach) const {
-  return on_device([&] {
+  return on_device(impl_->commands, [&] {
     impl_->begin_call();
     return impl_->boundaries.nearest(points_world, reach, impl_->map);
   });
@@ -49,14 +49,18 @@ std::vector<float> Mapper::clearance(const std::vector<Eigen::Vector3f>& points_
 std::vector<SpaceState> Mapper::box_states(const std::vector<Eigen::AlignedBox3f>& boxes_world, double step) const {
   return frontier_surfels::box_states(
       boxes_world, step, [this](const auto& points_world) { return states(points_world); },
-      [this](const auto& boxes, bool frontier_counts) { return on_device([&] { return impl_->first_within(boxes, frontier_counts); }); });
+      [this](const auto& boxes, bool frontier_counts) {
+        return on_device(impl_->commands, [&] { return impl_->first_within(boxes, frontier_counts); });
+      });
 }
 
 std::vector<RayState> Mapper::path_states(const std::vector<Ray>& paths_world, const Eigen::Vector3f& box_size, bool stop_at_unknown,
                                           double step) const {
   return frontier_surfels::path_states(
       paths_world, box_size, stop_at_unknown, step, [this](const auto& points_world) { return states(points_world); },
-      [this](const auto& boxes, bool frontier_counts) { return on_device([&] { return impl_->first_within(boxes, frontier_counts); }); });
+      [this](const auto& boxes, bool frontier_counts) {
+        return on_device(impl_->commands, [&] { return impl_->first_within(boxes, frontier_counts); });
+      });
 }
 
 std::vector<FirstSurfel> Mapper::Impl::first_within(const std::vector<MovingBox>& boxes, bool frontier_counts) {
@@ -65,7 +69,7 @@ std::vector<FirstSurfel> Mapper::Impl::first_within(const std::vector<MovingBox>
 }
 
 StateChanges Mapper::state_changes(std::uint64_t since, double resolution) const {
-  return on_device([&] { return impl_->state_changes(since, resolution); });
+  return on_device(impl_->commands, [&] { return impl_->state_changes(since, resolution); });
 }
 
 StateChanges Mapper::Impl::state_changes(std::uint64_t since, double resolution) {
@@ -118,7 +122,7 @@ std::vector<BlockKey> Mapper::Impl::known_blocks() const {
 
 std::vector<ViewValue> Mapper::evaluate_views(const ViewQuestion& question) const {
   check_question(question);
-  return on_device([&] { return impl_->evaluate_views(question); });
+  return on_device(impl_->commands, [&] { return impl_->evaluate_views(question); });
 }
 
 std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question) {

@@ -7,18 +7,12 @@
 #include <memory>
 #include <mutex>
 
-#include "opencl/kernel_files.hpp"
+#include "opencl/program_cache.hpp"
+#include "opencl/programs.hpp"
 #include "opencl/rounding.hpp"
 
 namespace frontier_surfels {
 namespace {
-
-/// All kernel files as one source. The compiler's messages name the file and its line.
-std::string source() {
-  std::string text;
-  for (const auto& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
-  return text;
-}
 
 constexpr std::size_t kHugePage = 2 << 20;  // [byte], on most processors
 
@@ -32,18 +26,6 @@ cl::Buffer allocate_on_host(const cl::Context& context, std::size_t bytes) {
   buffer.setDestructorCallback([](cl_mem, void* own) { std::free(own); }, memory.get());
   memory.release();
   return buffer;
-}
-
-cl::Program build(const Device& device) {
-  const std::string options = build_options(device);
-  cl::Program program(device.context, source());
-  try {
-    program.build({device.device}, options.c_str());
-  } catch (const cl::Error&) {
-    throw DeviceError("The kernels do not build on " + device.description + " with " + options + ":\n" +
-                      program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device.device));
-  }
-  return program;
 }
 
 /// Keeps a queue, which is small, for as long as the process lives: PoCL's threads may still use it to release the last command after
@@ -67,9 +49,10 @@ Commands::Commands(Device device) : device_(std::move(device)) {
     shape_ = shape_for(device_);
     queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
     max_buffer_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
-    std::vector<cl::Kernel> kernels;
-    build(device_).createKernels(&kernels);
-    for (const auto& kernel : kernels) kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
+    device_bytes_ = device_.device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+    const auto cache = device_.keeps_programs ? program_cache_folder() : std::filesystem::path();
+    for (const auto& kernel : build_kernels(device_, kernel_source(), build_options(device_), cache).kernels)
+      kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
   } catch (const cl::Error& error) {
     throw device_error(error);
   }
@@ -105,11 +88,19 @@ std::vector<StageTime> Commands::take_times() {
 
 cl::Buffer Commands::allocate(std::size_t bytes) {
   if (bytes > max_buffer_bytes_)
-    throw DeviceError("A buffer of " + std::to_string(bytes >> 20) + " MiB is needed and the device allows " +
-                      std::to_string(max_buffer_bytes_ >> 20) + " MiB; raise decimation, lower z_max or choose another device.");
-  FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
-  return device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
-                                                  : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+    throw DeviceError("A buffer of " + mebibytes(bytes) + " is needed and the device allows " + mebibytes(max_buffer_bytes_) + " (" +
+                      memory_text() + "); " + kLowerMemory);
+  try {
+    FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
+    return device_.is_cpu && bytes >= kHugePage / 2 ? allocate_on_host(device_.context, bytes)
+                                                    : cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+  } catch (const cl::Error& error) {
+    throw AllocationError(error, bytes);
+  }
+}
+
+std::string Commands::memory_text() const {
+  return "this mapper uses " + mebibytes(allocated_bytes_) + " of the device's " + mebibytes(device_bytes_);
 }
 
 }  // namespace frontier_surfels

@@ -79,6 +79,7 @@ class Commands {
   void allocated(std::size_t bytes) { allocated_bytes_ += bytes; }
   void release(std::size_t bytes) { allocated_bytes_ -= bytes; }
   std::size_t allocated_bytes() const { return allocated_bytes_; }
+  std::string memory_text() const;  ///< what is allocated and what the device has, as a clause for people
 
  private:
   Device device_;
@@ -87,7 +88,7 @@ class Commands {
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
-  std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0;
+  std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0, device_bytes_ = 0;
   bool pending_ = false;  ///< commands may still run
 };
 

@@ -1,70 +1,79 @@
 #include "opencl/device.hpp"
 
 #include <algorithm>
-#include <cctype>
+#include <vector>
 
+#include "opencl/device_listing.hpp"
+#include "opencl/device_ranking.hpp"
 #include "opencl/kernel_cache.hpp"
 
 namespace frontier_surfels {
 namespace {
 
-constexpr const char* kPocl = "Portable Computing Language";  // name of its platform
-
-struct Candidate {
-  std::string platform;
-  cl::Device device;
+struct Found {
+  std::vector<cl::Device> devices;
+  std::vector<DeviceFacts> facts;  ///< of each device
 };
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-cl_device_type type_of(const std::string& name) {
-  if (name == "cpu") return CL_DEVICE_TYPE_CPU;
-  if (name == "gpu") return CL_DEVICE_TYPE_GPU;
-  if (name == "accelerator") return CL_DEVICE_TYPE_ACCELERATOR;
-  return CL_DEVICE_TYPE_ALL;
-}
-
 std::string type_name(cl_device_type type) {
-  if (type & CL_DEVICE_TYPE_CPU) return "cpu";
   if (type & CL_DEVICE_TYPE_GPU) return "gpu";
+  if (type & CL_DEVICE_TYPE_CPU) return "cpu";
   return "accelerator";
 }
 
-std::vector<Candidate> all_devices() {
+/// A text that a driver gives, without the zero byte that some leave at its end.
+std::string text(std::string value) { return value.substr(0, value.find('\0')); }
+
+DeviceFacts facts_of(const std::string& platform, const cl::Device& device) {
+  DeviceFacts facts;
+  facts.platform = platform;
+  try {
+    facts.name = text(device.getInfo<CL_DEVICE_NAME>());
+    facts.driver = text(device.getInfo<CL_DRIVER_VERSION>());
+    facts.version = text(device.getInfo<CL_DEVICE_VERSION>());
+    facts.type = type_name(device.getInfo<CL_DEVICE_TYPE>());
+    facts.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+    facts.clock_mhz = device.getInfo<CL_DEVICE_MAX_CLOCK_FREQUENCY>();
+    facts.global_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+    facts.largest_buffer_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+    facts.local_bytes = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+    facts.available = device.getInfo<CL_DEVICE_AVAILABLE>();
+    facts.has_compiler = device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>();
+    facts.little_endian = device.getInfo<CL_DEVICE_ENDIAN_LITTLE>();
+    if (platform == kPocl) facts.fault = kernel_cache_fault(kernel_cache_folder());
+  } catch (const cl::Error& error) {
+    facts.fault = "its driver answers with " + opencl_error_name(error.err());
+  }
+  return facts;
+}
+
+/// All devices, in the order of the platforms.
+Found find_devices() {
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);
   } catch (const cl::Error&) {  // thrown if there is no platform
   }
-  std::vector<Candidate> found;
+  Found found;
   for (const auto& platform : platforms) {
     std::vector<cl::Device> devices;
     try {
       platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
     } catch (const cl::Error&) {  // thrown if the platform has no devices
     }
-    for (const auto& device : devices) found.push_back({platform.getInfo<CL_PLATFORM_NAME>(), device});
+    for (const auto& device : devices) {
+      found.devices.push_back(device);
+      found.facts.push_back(facts_of(text(platform.getInfo<CL_PLATFORM_NAME>()), device));
+    }
   }
   return found;
 }
 
-std::string describe(const Candidate& candidate) {
-  return candidate.platform + ": " + candidate.device.getInfo<CL_DEVICE_NAME>() + " (" +
-         type_name(candidate.device.getInfo<CL_DEVICE_TYPE>()) + ", " +
-         std::to_string(candidate.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()) + " compute units)";
-}
-
-std::string listing(const std::vector<Candidate>& candidates) {
-  const bool has_pocl = std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.platform == kPocl; });
-  const std::string fault = has_pocl ? "" : kernel_cache_fault(kernel_cache_folder());  // without the folder, PoCL has no devices
-  if (candidates.empty())
-    return " " + (fault.empty() ? "There is no OpenCL device at all: install a driver, or pocl-opencl-icd to use the CPU." : fault);
-  std::string text = " Available devices:";
-  for (const auto& candidate : candidates) text += "\n  " + describe(candidate);
-  return fault.empty() ? text : text + "\n" + fault;
+/// Why PoCL shows no devices: its cache folder; "" if it has some, or the folder is sound.
+std::string pocl_fault(const Found& found) {
+  const bool has_pocl =
+      std::any_of(found.facts.begin(), found.facts.end(), [](const DeviceFacts& facts) { return facts.platform == kPocl; });
+  return has_pocl ? "" : kernel_cache_fault(kernel_cache_folder());
 }
 
 /// A part of the device with `threads` compute units; the whole device if `threads` is 0 or it has no more.
@@ -88,45 +97,43 @@ cl::Device limit_threads(const cl::Device& device, int threads) {
   return parts.front();
 }
 
-void check_abilities(const cl::Device& device) {
-  const std::string name = device.getInfo<CL_DEVICE_NAME>();
-  if (!device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>())
-    throw DeviceError("The device " + name + " has no compiler for OpenCL C; choose another one.");
-  if (!device.getInfo<CL_DEVICE_ENDIAN_LITTLE>())
-    throw DeviceError("The device " + name + " is big endian, which the bit fields do not support; choose another one.");
-  constexpr cl_ulong kLocalMemory = 32 * 1024;
-  if (device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>() < kLocalMemory)
-    throw DeviceError("The device " + name + " has less than 32 KiB of local memory; choose another one.");
+Choice choose_or_explain(const Found& found, const Config& config) {
+  try {
+    return choose(found.facts, config);
+  } catch (const DeviceError& error) {
+    const std::string fault = pocl_fault(found);
+    throw DeviceError(error.what() + (fault.empty() ? "" : "\n" + fault));
+  }
 }
 
 }  // namespace
 
 Device choose_device(const Config& config) {
-  const std::vector<Candidate> candidates = all_devices();
-  int fitting = 0;
-  for (const auto& candidate : candidates) {
-    if (lower(candidate.platform).find(lower(config.platform)) == std::string::npos) continue;
-    if (!(candidate.device.getInfo<CL_DEVICE_TYPE>() & type_of(config.device_type))) continue;
-    if (fitting++ != config.device_index) continue;
-    try {
-      if (candidate.platform == kPocl)
-        if (const std::string fault = kernel_cache_fault(kernel_cache_folder()); !fault.empty()) throw DeviceError(fault);
-      check_abilities(candidate.device);
-      Device chosen;
-      chosen.device = limit_threads(candidate.device, config.threads);
-      chosen.context = cl::Context(chosen.device);
-      chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
-      chosen.is_cpu = chosen.device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU;
-      chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_cpu ? 16 : 1;
-      chosen.prefers_one_item = chosen.is_cpu && candidate.platform == kPocl;
-      chosen.description = describe({candidate.platform, chosen.device});
-      return chosen;
-    } catch (const cl::Error& error) {
-      throw device_error(error);
-    }
+  const Found found = find_devices();
+  const Choice choice = choose_or_explain(found, config);
+  DeviceFacts facts = found.facts[choice.index];
+  try {
+    Device chosen;
+    chosen.device = limit_threads(found.devices[choice.index], config.threads);
+    chosen.context = cl::Context(chosen.device);
+    chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
+    chosen.is_cpu = facts.type == "cpu";
+    chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_cpu ? 16 : 1;
+    chosen.prefers_one_item = chosen.is_cpu && facts.platform == kPocl;
+    chosen.keeps_programs = facts.platform != kPocl;
+    facts.compute_units = chosen.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+    chosen.description = describe(facts);
+    chosen.choice = choice.why;
+    return chosen;
+  } catch (const cl::Error& error) {
+    throw device_error(error);
   }
-  throw DeviceError("No OpenCL device fits platform '" + config.platform + "', device_type '" + config.device_type + "', device_index " +
-                    std::to_string(config.device_index) + "." + listing(candidates));
+}
+
+std::string device_listing() {
+  const Found found = find_devices();
+  const std::string fault = pocl_fault(found);
+  return listing(found.facts, {}) + (fault.empty() ? "" : fault + "\n");
 }
 
 }  // namespace frontier_surfels

@@ -14,10 +14,14 @@ struct Device {
   bool prefers_one_item = false;  ///< one work item does small jobs alone, because a launch costs more on PoCL; not on llvmpipe, which
                                   ///< ends loops after 65535 turns
   bool shares_memory = false;     ///< the device works in the host's memory
+  bool keeps_programs = false;    ///< built kernels are kept as files; not on PoCL, which has a cache of its own: what ours would gain
+                                  ///< there was not measured
   std::string description;        ///< platform, name and compute units
+  std::string choice;             ///< why this device was taken, for display
 };
 
-/// Chooses the device by platform, device_type, device_index and threads of the configuration, and the lanes of its work items.
+/// Chooses the device by platform, device_type, device_index and threads of the configuration, see device_ranking.hpp, and the lanes of its
+/// work items.
 /// @throws DeviceError  no device fits (the message lists all devices), or the device lacks something that the kernels need
 Device choose_device(const Config& config);
 

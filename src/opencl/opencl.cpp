@@ -2,6 +2,11 @@
 
 namespace frontier_surfels {
 
+std::string mebibytes(std::size_t bytes) {
+  const std::size_t tenths = (bytes * 10 + (std::size_t{1} << 20) - 1) >> 20;  // rounded up: what is small is not 0
+  return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " MiB";
+}
+
 std::string opencl_error_name(cl_int code) {
   switch (code) {
     case CL_DEVICE_NOT_FOUND:
@@ -29,16 +34,21 @@ std::string opencl_error_name(cl_int code) {
   }
 }
 
-DeviceError device_error(const cl::Error& error) {
-  const bool memory = error.err() == CL_MEM_OBJECT_ALLOCATION_FAILURE || error.err() == CL_OUT_OF_RESOURCES ||
-                      error.err() == CL_OUT_OF_HOST_MEMORY || error.err() == CL_INVALID_BUFFER_SIZE;
-  return DeviceError(std::string("The OpenCL call ") + error.what() + " failed with " + opencl_error_name(error.err()) +
-                     (memory ? ": the device has too little free memory; raise decimation, lower z_max or choose another device."
-                             : "; choose another device or look at the driver's log."));
+DeviceError device_error(const cl::Error& error, const std::string& memory) {
+  const std::string failed = std::string("The OpenCL call ") + error.what() + " failed with " + opencl_error_name(error.err());
+  const bool is_memory = error.err() == CL_MEM_OBJECT_ALLOCATION_FAILURE || error.err() == CL_OUT_OF_RESOURCES ||
+                         error.err() == CL_OUT_OF_HOST_MEMORY || error.err() == CL_INVALID_BUFFER_SIZE;
+  if (!is_memory) return DeviceError(failed + "; choose another device or look at the driver's log.");
+  std::string numbers;
+  if (const auto* allocation = dynamic_cast<const AllocationError*>(&error))
+    numbers = "a buffer of " + mebibytes(allocation->bytes) + " is needed";
+  if (!memory.empty()) numbers += (numbers.empty() ? "" : ", ") + memory;
+  return DeviceError(failed + ": the device has too little free memory" + (numbers.empty() ? "" : " (" + numbers + ")") + "; " +
+                     kLowerMemory);
 }
 
-void throw_device_error(const std::exception& error) {
-  if (const auto* opencl = dynamic_cast<const cl::Error*>(&error)) throw device_error(*opencl);
+void throw_device_error(const std::exception& error, const std::string& memory) {
+  if (const auto* opencl = dynamic_cast<const cl::Error*>(&error)) throw device_error(*opencl, memory);
   throw;
 }
 

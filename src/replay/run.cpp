@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ctime>
 #include <fstream>
+#include <iostream>
 
 #include "replay/progress.hpp"
 #include "scoring/cpu_clock.hpp"
@@ -99,6 +100,7 @@ Run map_frames(Mapper& mapper, FrameSource& source, const std::function<void(con
 Run map_recording(const Recording& recording, const Config& config, Yardsticks* yardsticks, const std::function<bool()>& stop) {
   const auto source = open_source(recording.path, recording.options);
   Mapper mapper(config);
+  std::cout << "Device: " << mapper.device() << " (" << mapper.device_choice() << ")" << std::endl;
   if (!config.map_folder.empty() && !mapper.whole_map().empty()) {
     throw Error("The map folder '" + config.map_folder +
                 "' already has a map, which would be scored as if it were made of this recording: delete the folder, or choose another.");

@@ -121,7 +121,8 @@ MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
   planner_services_ =
       std::make_unique<PlannerServices>(*services_, config_, mapper_, *worker_, *planner_publisher_, [this] { push_to_planners(); });
   services_->start();
-  ROS_INFO("Mapping %s in the frame %s on %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str(), mapper_.device().c_str());
+  ROS_INFO("Device: %s (%s)", mapper_.device().c_str(), mapper_.device_choice().c_str());
+  ROS_INFO("Mapping %s in the frame %s.", depth_topics(nh_).c_str(), config_.world_frame.c_str());
 }
 
 void MapperRos::Impl::tell_parameters() {
