@@ -22,7 +22,8 @@ typedef struct {
   ushort chunks[TILE_CHUNKS];            // that have such: work item n's are chunks[n], chunks[n + work items] ...
   ushort views[MOST_VIEWS];              // to be asked, in this order
   uint view_count;
-  uint likely_views;  // of the first group: those asked because of the probes, a bit each
+  uint likely_views;          // of the first group: those asked because of the probes, a bit each
+  uint known_by[PROBES + 1];  // of the first group: those that know so many probes, a bit each
 } Tile;
 
 INLINE ulong all_bits(ulong8 words) {
@@ -49,16 +50,19 @@ INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
 
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
 
-// Lists a tile's candidates. One work item does this, and what the next two functions do.
+// Lists a tile's candidates, by columns. Each work item has a share of the columns, and counts what those before it have.
 INLINE void list_entries(__local Tile* own, int3 tile) {
+  const int item = get_local_id(0), items = get_local_size(0), first = TILE_COLUMNS * item / items,
+            last = TILE_COLUMNS * (item + 1) / items;
   uint count = 0;
-  for (int column = 0; column < TILE_COLUMNS; ++column)
+  for (int column = 0; column < first; ++column) count += popcount(tile_layers(own->words[column], tile));
+  for (int column = first; column < last; ++column)
     for (uint left = tile_layers(own->words[column], tile); left != 0; left &= left - 1)
       own->entries[count++] = (ushort)(column * VIEW_TILE_K + lowest_lane(left));
-  own->entry_count = count;
+  if (item == items - 1) own->entry_count = count;
 }
 
-// Takes those off the list that are settled.
+// Takes those off the list that are settled. One work item does this, and what the next function does.
 INLINE void drop_settled(__local Tile* own) {
   uint count = 0;
   for (uint first = 0; first < own->entry_count; first += LANES)
@@ -120,17 +124,21 @@ INLINE intv count_known(const Grid* g, int3 tile, __global const float* layer_de
 // Lists those views of the first group that know some of the probes, those that know most first.
 INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* layer_depth, __global const View* views,
                               __global const float* view_lanes, __global const ushort* depths, __local Tile* own) {
-  uint known_by[PROBES + 1] = {0};  // views that know so many probes, a bit each
-  for (int part = 0; part < VIEW_PARTS; ++part) {
+  const int item = get_local_id(0), items = get_local_size(0);
+  for (int known = item; known <= PROBES; known += items) own->known_by[known] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int part = item; part < VIEW_PARTS; part += items) {
     const ViewLanes lanes = load_view_lanes(view_lanes, part);
     const intv counts = count_known(g, tile, layer_depth, &lanes, depths, views->depth_step, own);
-    for (int known = 1; known <= PROBES; ++known) known_by[known] |= lane_bits(MARK(counts == known)) << (part * LANES);
+    for (int known = 1; known <= PROBES; ++known) atomic_or(&own->known_by[known], lane_bits(MARK(counts == known)) << (part * LANES));
   }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (item != 0) return;
   uint count = 0;
   own->likely_views = 0;
   for (int known = PROBES; known > 0; --known) {
-    for (uint left = known_by[known]; left != 0; left &= left - 1) own->views[count++] = (ushort)lowest_lane(left);
-    own->likely_views |= known_by[known];
+    for (uint left = own->known_by[known]; left != 0; left &= left - 1) own->views[count++] = (ushort)lowest_lane(left);
+    own->likely_views |= own->known_by[known];
   }
   own->view_count = count;
 }
@@ -273,16 +281,14 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
     if (tile_layers(own.layers, tile) == 0) continue;
     const int tile_number = (tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x;
     __global ushort* own_views = tile_views + tile_number * view_groups;
-    if (item == 0) list_entries(&own, tile);
+    list_entries(&own, tile);
     barrier(CLK_LOCAL_MEM_FENCE);
     if (f.has_taken && set_taken_aside(&f, &taken, tile, layer_depth, &own)) {
       for (int n = item; n < view_groups; n += items) own_views[n] = 0;  // no candidate may be left that sets them
       if (item == 0) tile_seen[tile_number] = SEEN_NONE;
     }
-    if (item == 0) {
-      own.view_count = own.likely_views = 0;
-      if (view_count > 0 && own.entry_count != 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
-    }
+    if (item == 0) own.view_count = own.likely_views = 0;
+    if (view_count > 0 && own.entry_count != 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
     barrier(CLK_LOCAL_MEM_FENCE);
     ask_views(&f.grid, tile, layer_depth, views, depths, &own);
     if (own.entry_count != 0) {
