@@ -134,10 +134,11 @@ class Judged(WithFolder):
             self.assert_same(value['truth'], value['exact'])
         self.assertEqual(values[1]['truth'], read_json(self.report)['truth'])
 
-    def check_refused(self, sentence, truth):
+    def check_refused(self, sentence, truth, told=r''):
         report = self.path('refused')
         result = run(self.clean, '--truth', truth, '--report', report)
-        self.assertEqual((result.returncode, result.stdout), (FAILED, ''))
+        self.assertEqual(result.returncode, FAILED)
+        self.assertRegex(result.stdout, rf'^{told}$')
         self.assertRegex(result.stderr, rf'^replay_score: [^\n]*{sentence}[^\n]*\n$')
         self.assertFalse(os.path.exists(report))
 
@@ -156,7 +157,7 @@ class Judged(WithFolder):
         damaged = shutil.copytree(os.path.join(self.clean, 'truth'), self.path('unreadable'))
         with open(os.path.join(damaged, 'depth', '000005.tiff'), 'w', encoding='utf-8') as file:
             file.write('no image')
-        self.check_refused(r'000005\.tiff cannot be used', damaged)
+        self.check_refused(r'000005\.tiff cannot be used', damaged, told=r'Device: [^\n]+\n')
 
 
 class Things(WithFolder):
