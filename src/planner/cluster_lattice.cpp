@@ -1,11 +1,7 @@
 #include "planner/cluster_lattice.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <string>
 #include <utility>
 
@@ -51,7 +47,7 @@ inline BlockKey ClusterLattice::key_of(const Eigen::Vector3f& position) const {
 /// Nullptr if no surfel near this id was ever seen.
 inline ClusterLattice::Page* ClusterLattice::page_of(std::uint32_t id) {
   const std::size_t page = id / kPage;
-  return page < pages_.size() ? pages_[page] : nullptr;
+  return page < pages_.size() ? pages_[page].get() : nullptr;
 }
 
 /// Nullptr if there is no surfel with this id.
@@ -104,8 +100,6 @@ void ClusterLattice::apply(const Changes& changes) {
   check(changes);
   if (changes.since == 0) {
     pages_.clear();
-    memory_.clear();
-    page_count_ = 0;
     cubes_.clear();
     recent_cubes_ = {};
     chunks_.clear();
@@ -156,13 +150,13 @@ void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
   for (std::size_t n = 0; n < count; ++n) {
     const Surfel& s = surfels[n];
     if (s.id / kPage >= pages_.size()) pages_.resize(s.id / kPage + 1);
-    Page*& page = pages_[s.id / kPage];
-    if (page == nullptr) page = take_page();
+    std::unique_ptr<Page>& page = pages_[s.id / kPage];
+    if (!page) page = std::make_unique<Page>();
     Kept now = {{s.position.x(), s.position.y(), s.position.z()},
                 {s.normal.x(), s.normal.y(), s.normal.z()},
                 s.label == Label::kFrontier ? s.radius : -s.radius,
                 0};
-    const Kept* before = kept(page, s.id);
+    const Kept* before = kept(page.get(), s.id);
     if (before != nullptr && before->looks_like(now)) continue;
     ClusterCell& cell = cells[n] != nullptr ? *cells[n] : cell_at(keys_[n]);
     now.cell = cell.number;
@@ -173,17 +167,6 @@ void ClusterLattice::put(const Surfel* surfels, std::size_t count) {
     page->surfels[s.id % kPage] = now;
     page->exists |= std::uint64_t{1} << s.id % kPage;
   }
-}
-
-/// Pages come in large pieces of memory: else the first touch of each of its small pages takes as long as what is done with the surfels.
-ClusterLattice::Page* ClusterLattice::take_page() {
-  if (page_count_ == memory_.size() * kPagesAtOnce) {
-    void* memory = std::aligned_alloc(kHugePage, kHugePage);
-    if (memory == nullptr) throw std::bad_alloc();
-    memory_.emplace_back(static_cast<Page*>(memory));
-    madvise(memory, kHugePage, MADV_HUGEPAGE);  // only advice: it may fail
-  }
-  return new (memory_.back().get() + page_count_++ % kPagesAtOnce) Page();
 }
 
 ClusterCell& ClusterLattice::cell_at(const BlockKey& key) {

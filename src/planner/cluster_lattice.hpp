@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <memory>
 #include <unordered_map>
 #include <utility>
@@ -99,7 +98,6 @@ class ClusterLattice {
 
   void check(const Changes& changes) const;
   Page* page_of(std::uint32_t id);
-  Page* take_page();
   static Kept* kept(Page* page, std::uint32_t id);
   void remove(const std::vector<std::uint32_t>& ids);
   void put(const Surfel* surfels, std::size_t count);
@@ -113,16 +111,9 @@ class ClusterLattice {
   void link(ClusterCell& cell);
   BlockKey key_of(const Eigen::Vector3f& position) const;
 
-  double cell_;                                                   ///< [m]
-  double per_metre_;                                              ///< [cell/m]
-  static constexpr std::size_t kHugePage = std::size_t{1} << 21;  ///< [byte] on most processors
-  static constexpr std::size_t kPagesAtOnce = kHugePage / sizeof(Page);
-  struct Free {
-    void operator()(Page* pages) const { std::free(pages); }
-  };
-  std::vector<std::unique_ptr<Page, Free>> memory_;  ///< of the pages
-  std::size_t page_count_ = 0;
-  std::vector<Page*> pages_;  ///< null: none
+  double cell_;       ///< [m]
+  double per_metre_;  ///< [cell/m]
+  std::vector<std::unique_ptr<Page>> pages_;
   std::unordered_map<BlockKey, Cube> cubes_;
   std::array<std::pair<BlockKey, Cube*>, kRecent> recent_cubes_ = {};  ///< of find_cube(), by hash; null: none
   std::vector<std::unique_ptr<Chunk>> chunks_;                         ///< cells by number
