@@ -281,7 +281,8 @@ Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
   changes.updated.reserve(slots.size());
   if (commands_.device().is_cpu && !slots.empty()) {  // its memory is the host's, who reads the surfels where they are
     const std::size_t bytes = PAGE_SLOTS * index_.end() * sizeof(cl_uint4);
-    void* surfels = commands_.queue().enqueueMapBuffer(surfels_(), CL_TRUE, CL_MAP_READ, 0, bytes);
+    FaultInjection::waits();
+    void* surfels = commands_.queue(Call::kRead).enqueueMapBuffer(surfels_(), CL_TRUE, CL_MAP_READ, 0, bytes);
     unpack_slots(static_cast<const cl_uint4*>(surfels), slots, blocks, block_size_, changes.updated);
     commands_.queue().enqueueUnmapMemObject(surfels_(), surfels);
     return changes;

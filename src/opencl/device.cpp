@@ -21,16 +21,13 @@ std::string type_name(cl_device_type type) {
   return "accelerator";
 }
 
-/// A text that a driver gives, without the zero byte that some leave at its end.
-std::string text(std::string value) { return value.substr(0, value.find('\0')); }
-
 DeviceFacts facts_of(const std::string& platform, const cl::Device& device) {
   DeviceFacts facts;
   facts.platform = platform;
   try {
-    facts.name = text(device.getInfo<CL_DEVICE_NAME>());
-    facts.driver = text(device.getInfo<CL_DRIVER_VERSION>());
-    facts.version = text(device.getInfo<CL_DEVICE_VERSION>());
+    facts.name = driver_text(device.getInfo<CL_DEVICE_NAME>());
+    facts.driver = driver_text(device.getInfo<CL_DRIVER_VERSION>());
+    facts.version = driver_text(device.getInfo<CL_DEVICE_VERSION>());
     facts.type = type_name(device.getInfo<CL_DEVICE_TYPE>());
     facts.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
     facts.clock_mhz = device.getInfo<CL_DEVICE_MAX_CLOCK_FREQUENCY>();
@@ -63,7 +60,7 @@ Found find_devices() {
     }
     for (const auto& device : devices) {
       found.devices.push_back(device);
-      found.facts.push_back(facts_of(text(platform.getInfo<CL_PLATFORM_NAME>()), device));
+      found.facts.push_back(facts_of(driver_text(platform.getInfo<CL_PLATFORM_NAME>()), device));
     }
   }
   return found;

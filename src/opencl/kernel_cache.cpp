@@ -6,13 +6,10 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "opencl/cache_folder.hpp"
+
 namespace frontier_surfels {
 namespace {
-
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
 
 /// Makes the folder and a file in it, which goes at once.
 std::error_code try_to_write(const std::filesystem::path& folder) {
@@ -30,10 +27,8 @@ std::error_code try_to_write(const std::filesystem::path& folder) {
 }  // namespace
 
 std::filesystem::path kernel_cache_folder() {
-  if (const std::string folder = variable("POCL_CACHE_DIR"); !folder.empty()) return std::filesystem::absolute(folder);
-  if (const std::string caches = variable("XDG_CACHE_HOME"); !caches.empty()) return std::filesystem::path(caches) / "pocl/kcache";
-  if (const std::string home = variable("HOME"); !home.empty()) return std::filesystem::path(home) / ".cache/pocl/kcache";
-  return "/tmp/pocl/kcache";
+  const std::filesystem::path folder = cache_folder("POCL_CACHE_DIR", "pocl/kcache");
+  return folder.empty() ? "/tmp/pocl/kcache" : folder;
 }
 
 std::string kernel_cache_fault(const std::filesystem::path& folder, std::uintmax_t needed) {

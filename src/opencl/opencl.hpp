@@ -12,6 +12,9 @@ namespace frontier_surfels {
 /// Name of an OpenCL error code; "error -1234" for codes without a name in this function.
 std::string opencl_error_name(cl_int code);
 
+/// A text that a driver gives, without the zero byte that some leave at its end.
+inline std::string driver_text(const std::string& text) { return text.substr(0, text.find('\0')); }
+
 /// An amount of memory for people, for instance "12.5 MiB".
 std::string mebibytes(std::size_t bytes);
 

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "opencl/cache_folder.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -26,11 +28,6 @@ struct Header {
 
 std::uint64_t checksum(const std::string& text) {
   return crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(text.data()), text.size());
-}
-
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
 }
 
 /// FNV-1a. The identity is also in the file, so that two with the same hash take turns and are not confused.
@@ -74,12 +71,7 @@ bool write_all(int file, const std::string& text) {
 
 }  // namespace
 
-fs::path program_cache_folder() {
-  if (const std::string folder = variable("FRONTIER_SURFELS_CACHE_DIR"); !folder.empty()) return folder;
-  if (const std::string caches = variable("XDG_CACHE_HOME"); !caches.empty()) return fs::path(caches) / "frontier_surfels";
-  if (const std::string home = variable("HOME"); !home.empty()) return fs::path(home) / ".cache/frontier_surfels";
-  return "";
-}
+fs::path program_cache_folder() { return cache_folder("FRONTIER_SURFELS_CACHE_DIR", "frontier_surfels"); }
 
 fs::path program_file(const fs::path& folder, const std::string& identity) { return folder / (hash(identity) + ".program"); }
 

@@ -68,7 +68,7 @@ std::string program_identity(const cl::Device& device, const std::string& source
   for (const std::string& part :
        {platform.getInfo<CL_PLATFORM_NAME>(), platform.getInfo<CL_PLATFORM_VERSION>(), device.getInfo<CL_DEVICE_NAME>(),
         device.getInfo<CL_DEVICE_VENDOR>(), device.getInfo<CL_DEVICE_VERSION>(), device.getInfo<CL_DRIVER_VERSION>(), options, source})
-    text += part.substr(0, part.find('\0')) + "\n";
+    text += driver_text(part) + "\n";
   return text;
 }
 

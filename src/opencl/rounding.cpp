@@ -1,8 +1,9 @@
 #include "opencl/rounding.hpp"
 
 #include <cmath>
-#include <cstdint>
 #include <vector>
+
+#include "opencl/test_numbers.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -19,14 +20,10 @@ __kernel void divide(__global const float* a, __global const float* b, __global 
 /// Of those that are only nearly right, about one in four has another last bit.
 bool divides_correctly(const Device& device) {
   std::vector<float> a, b, quotients(kNumbers), roots(kNumbers);
-  std::uint64_t state = 18;
-  const auto next = [&state] {
-    state = state * 6364136223846793005U + 1442695040888963407U;
-    return std::ldexp(static_cast<float>(0x800000 + (state >> 41)), static_cast<int>(state >> 33 & 7) - 24);
-  };
+  TestNumbers numbers;
   for (std::size_t n = 0; n < kNumbers; ++n) {
-    a.push_back(next());
-    b.push_back(next());
+    a.push_back(std::abs(numbers.any()));
+    b.push_back(std::abs(numbers.any()));
   }
   cl::Program program(device.context, kSource);
   program.build({device.device}, "-cl-std=CL1.2");

@@ -1,31 +1,13 @@
 #include "stages/arithmetic_check.hpp"
 
 #include <cmath>
-#include <cstdint>
-#include <cstring>
+
+#include "opencl/test_numbers.hpp"
 
 namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kTriples = 256;
-
-/// Pseudo-random numbers by whole numbers alone, for input that is the same on every machine.
-class Numbers {
- public:
-  std::uint32_t next() {
-    state_ = state_ * 6364136223846793005U + 1442695040888963407U;
-    return static_cast<std::uint32_t>(state_ >> 33);
-  }
-
-  /// Of either sign, with all digits of a float, between 2^-8 and 2^8.
-  float any() {
-    const float digits = static_cast<float>(0x800000 + (next() & 0x7fffff));
-    return std::ldexp(next() & 1 ? digits : -digits, static_cast<int>(next() % 16) - 31);
-  }
-
- private:
-  std::uint64_t state_ = 18;
-};
 
 struct Operation {
   const char* name;
@@ -48,7 +30,7 @@ constexpr std::size_t kCount = sizeof(kOperations) / sizeof(kOperations[0]);
 }  // namespace
 
 ArithmeticInput arithmetic_input() {
-  Numbers numbers;
+  TestNumbers numbers;
   ArithmeticInput input;
   for (std::size_t n = 0; n < kTriples; ++n) {
     float a = numbers.any(), b = numbers.any(), c = numbers.any();

@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <exception>
 
+#include "frontier_surfels/config.hpp"
 #include "recordings/frame_source.hpp"
+#include "scoring/decimated_depth.hpp"
 
 namespace {
 
@@ -19,11 +21,11 @@ std::uint16_t steps(float metres) {
 }
 
 RawFrame raw(const replay::RecordedFrame& frame) {
-  cv::Mat metres = frame.depth;
-  if (metres.type() != CV_32FC1) frame.depth.convertTo(metres, CV_32FC1, 0.001);
+  const DepthImage depth = frame.view().depth;
   RawFrame out{frame.stamp, frame.T_world_camera, {}};
-  for (int v = 0; v < metres.rows; ++v)
-    for (int u = 0; u < metres.cols; ++u) out.depth.push_back(steps(metres.at<float>(v, u)));
+  for (int row = 0; row < depth.height; ++row)
+    for (int column = 0; column < depth.width; ++column)
+      out.depth.push_back(steps(scoring::read_depth(depth, column, row, Config().depth_unit)));
   return out;
 }
 
