@@ -87,6 +87,13 @@ class Simulation {
     std::set<std::uint64_t> maps(readers_.begin(), readers_.end());
     maps.erase(0);
     log.divide({maps.begin(), maps.end()}, now_, alive_);
+    const auto known = by_page(log.known(alive_.size()));
+    for (std::size_t n = 0; n < readers_.size(); ++n) {
+      EXPECT_TRUE(contains(known, by_page(known_[n]))) << "what reader " << n << " knows is not reserved";
+    }
+    if (maps.size() == 1) {
+      EXPECT_EQ(known, by_page(alive_)) << "all readers have this map";
+    }
   }
 
   void run(int frames) {

@@ -108,8 +108,8 @@ TEST_F(MapperChanges, SinceANumberThatHasNotComeAreTheWholeMap) {
 /// The changes of the last frame contain what it has changed, and no more.
 TEST(MapperChange, OfTheLastFrameIsExact) {
   Mapper mapper(undecimated());
-  mapper.changes(0);  // a reader, whose ids are kept
   integrate_all(mapper, orbit_frames(coarse_camera(), 4, 5));
+  mapper.changes(0);  // a reader, whose ids are kept
   const Map before = mapper.surfels();
   const Report report = mapper.integrate(orbit_frames(coarse_camera(), 5, 5).back().view());
   const Changes changes = mapper.changes(mapper.sequence() - 1);

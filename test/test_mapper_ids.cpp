@@ -113,6 +113,24 @@ TEST_F(MapperIds, OfReadersThatBeginLate) {
   EXPECT_TRUE(prompt.read(mapper_)) << "others are not disturbed";
 }
 
+/// What frames add and remove between two questions of a reader was never known to it, and takes no room.
+TEST(MapperIdsOfAPlanner, SlotsOfShortLivedSurfelsAreUsedAgain) {
+  const Frames frames = orbit_frames(coarse_camera(), 40);
+  Mapper alone(undecimated()), followed(undecimated());
+  Reader reader;
+  std::size_t removed = 0, alone_bytes = 0, followed_bytes = 0;
+  for (std::size_t n = 0; n < frames.size(); ++n) {
+    if (n % 20 == 10) reader.read(followed);
+    alone_bytes = alone.integrate(frames[n].view()).map_bytes;
+    const Report report = followed.integrate(frames[n].view());
+    followed_bytes = report.map_bytes;
+    removed += report.removed;
+  }
+  reader.read(followed);
+  EXPECT_GT(removed, 2 * alone.size()) << "too little is removed for this test";
+  EXPECT_LE(static_cast<double>(followed_bytes), 1.5 * static_cast<double>(alone_bytes));
+}
+
 /// Slots of removed surfels are used again, so that following a map does not make it larger and larger.
 TEST_F(MapperIds, FollowingTheMapAddsNoMemory) {
   Reader reader;

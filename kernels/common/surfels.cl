@@ -7,7 +7,7 @@
 //   alive[pages]: a bit for each slot that holds a surfel
 //   page_block[pages]: x, y, z of the block; w: number of the frame that changed the page last
 //   changed[pages]: a bit for each slot that this frame has changed, for pages of this frame's window
-//   reserved[pages]: a bit for each slot that holds a surfel, and for those whose former surfel may not be known to have been removed
+//   reserved[pages]: a bit for each slot whose surfel, alive or not, somebody knows who follows the map: no other surfel may take it
 //
 // Where a stage goes through all surfels of the window's pages, PAGE_ITEMS work items share a page and handle LANES surfels each.
 

@@ -3,7 +3,7 @@
 // New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: this does not
 // depend on the number of threads. For that they are sorted by cell (block of the window), and keep the list's order in each cell.
 //
-// taken[pages] has a bit for each slot that is not free. It is `alive`, or, while ids must not be given again at once, `reserved`.
+// A slot is free if it is neither in `alive` nor in `reserved`. Where no ids are reserved, both are the same buffer.
 
 // One work item handles an entry of a list of bits in pages: it becomes a slot of the map.
 //   in  pages;   i/o list[count]: before: 64 n + bit for page pages[n]; after: slots
@@ -34,11 +34,14 @@ __kernel void sort_by_cell(__global const uint* new_cells, const uint count, con
     order[histogram[chunks * new_cells[n] + chunk]++] = n;
 }
 
+INLINE ulong taken_slots(uint page, __global const ulong* alive, __global const ulong* reserved) { return alive[page] | reserved[page]; }
+
 // One work item handles a page: it counts its free slots.
-//   in  pages[count]: of the window, by cell;  taken;   out free_slots[count]
-__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* taken, __global uint* free_slots) {
+//   in  pages[count]: of the window, by cell;  alive, reserved;   out free_slots[count]
+__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* reserved,
+                         __global uint* free_slots) {
   const uint n = get_global_id(0);
-  if (n < count) free_slots[n] = PAGE_SLOTS - popcount(taken[pages[n]]);
+  if (n < count) free_slots[n] = PAGE_SLOTS - (uint)popcount(taken_slots(pages[n], alive, reserved));
 }
 
 // Pages that a block needs for new surfels in addition to its free slots.
@@ -61,8 +64,8 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
 
 // One work item does all of the above for few new surfels, where launches take longer than that.
 __kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
-                       __global const ulong* taken, __global const uint* cell_pages, const uint cells, __global uint* free_before,
-                       __global uint* cell_begin, __global uint* missing, __global uint* order) {
+                       __global const ulong* alive, __global const ulong* reserved, __global const uint* cell_pages, const uint cells,
+                       __global uint* free_before, __global uint* cell_begin, __global uint* missing, __global uint* order) {
   if (get_global_id(0) > 0) return;
   for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
   for (uint n = 0; n < count; ++n) ++cell_begin[new_cells[n] + 1];
@@ -75,7 +78,7 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
   uint free_slots = 0;
   for (uint n = 0; n < page_count; ++n) {
     free_before[n] = free_slots;
-    free_slots += PAGE_SLOTS - (uint)popcount(taken[pages[n]]);
+    free_slots += PAGE_SLOTS - (uint)popcount(taken_slots(pages[n], alive, reserved));
   }
   free_before[page_count] = free_slots;
   for (uint cell = 0; cell < cells; ++cell)
@@ -91,31 +94,30 @@ INLINE uint first_of_page(uint n, uint cell, uint known, __global const uint* ne
 }
 
 // Notes which slots of a page have been filled.
-INLINE void note_filled(const Window* window, uint page, uint cell, ulong before, ulong filled, __global int4* page_block,
-                        __global ulong* alive, __global ulong* changed, __global ulong* taken) {
+INLINE void note_filled(const Window* window, uint page, uint cell, ulong filled, __global int4* page_block, __global ulong* alive,
+                        __global ulong* changed) {
   if (filled == 0) return;
   const int3 place = (int3)(cell % window->size_x, cell / window->size_x % window->size_y, cell / window->size_x / window->size_y);
   page_block[page].xyz = (int3)(window->origin_x, window->origin_y, window->origin_z) + place;
   alive[page] |= filled;
   changed[page] |= filled;
-  taken[page] = before | filled;
 }
 
 // The free slots of the window's pages take their share of the cell's new surfels. One work item handles a page; at width 1 a work-group
 // has a page, and a work item a slot.
 //   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
 //       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
-//   i/o page_block, alive, changed, surfels: the map;  taken: may be the same buffer as `alive`
+//   i/o page_block, alive, changed, surfels: the map;  reserved: may be the same buffer as `alive`
 __kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
                          __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
-                         __global ulong* taken, __global uint4* surfels) {
+                         __global ulong* reserved, __global uint4* surfels) {
   const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0), known = count - new_count;
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
   const uint first = first_of_page(n, cell, known, new_ranks, cell_begin, cell_pages, free_before);
-  const ulong before = n < known ? taken[page] : 0;  // added pages are free, whatever they have been before
+  const ulong before = n < known ? taken_slots(page, alive, reserved) : 0;  // added pages are free, whatever they have been before
 #if LANES == 1
   __local SharedWord filled;
   const uint slot = get_local_id(0), at = first + (uint)popcount(~before & ((1ul << slot) - 1));
@@ -123,7 +125,7 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
   if (fills) surfels[PAGE_SLOTS * page + slot] = new_surfels[order[at]];
   share_lane_bits(fills ? 1 : 0, (int)slot, &filled);
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-  if (slot == 0) note_filled(&window, page, cell, before, read_shared_word(&filled), page_block, alive, changed, taken);
+  if (slot == 0) note_filled(&window, page, cell, read_shared_word(&filled), page_block, alive, changed);
 #else
   ulong filled = 0;
   uint at = first;
@@ -132,31 +134,23 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
     surfels[PAGE_SLOTS * page + bit] = new_surfels[order[at]];
     filled |= 1ul << bit;
   }
-  note_filled(&window, page, cell, before, filled, page_block, alive, changed, taken);
+  note_filled(&window, page, cell, filled, page_block, alive, changed);
 #endif
-}
-
-// One work item handles a page of the map: if it has not changed after frame `told`, only its surfels are reserved.
-//   in  page_block, alive;   i/o reserved[count]
-__kernel void reserve_slots(const uint count, __global const int4* page_block, __global const ulong* alive, const uint told,
-                            __global ulong* reserved) {
-  const uint page = get_global_id(0);
-  if (page < count && (uint)page_block[page].w <= told) reserved[page] = alive[page];
 }
 
 // What the frame may overwrite next is kept. Called again before more is overwritten. One work item handles a page of the window; at width
 // 1 a work-group has a page, and a work item a slot.
 //   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
-//       page_block, alive, taken, changed, surfels: the map; surfels marked as changed may be overwritten, too
+//       page_block, alive, changed, surfels: the map; surfels marked as changed may be overwritten, too
 //       room: number of surfels that can be kept
-//   out kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count]: as at the first call
+//   out kept_pages[count], kept_frames[count], kept_alive[count]: as at the first call
 //   i/o kept_slots[count]: a bit for each surfel that is kept;  kept_count: number of these
 //       kept_surfel_slots[kept_count], kept_surfels[kept_count]: where each of them was, in any order
 __kernel void back_up_pages(__global const uint* pages, const uint count, const int first, __global const ulong* freed,
-                            __global const int4* page_block, __global const ulong* alive, __global const ulong* taken,
-                            __global const ulong* changed, __global const uint4* surfels, const uint room, __global uint* kept_pages,
-                            __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_taken, __global ulong* kept_slots,
-                            __global uint* kept_count, __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
+                            __global const int4* page_block, __global const ulong* alive, __global const ulong* changed,
+                            __global const uint4* surfels, const uint room, __global uint* kept_pages, __global int* kept_frames,
+                            __global ulong* kept_alive, __global ulong* kept_slots, __global uint* kept_count,
+                            __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
   const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0);
   if (n >= count) return;
   const uint page = pages[n];
@@ -174,7 +168,6 @@ __kernel void back_up_pages(__global const uint* pages, const uint count, const 
     kept_pages[n] = page;
     kept_frames[n] = page_block[page].w;
     kept_alive[n] = at_first;
-    kept_taken[n] = taken[page];
   }
   if (slot == 0 && (first || slots != 0)) kept_slots[n] = before | slots;
 #if LANES == 1
@@ -194,16 +187,14 @@ __kernel void back_up_pages(__global const uint* pages, const uint count, const 
 }
 
 // One work item handles a page that back_up_pages has kept, after the frame has failed.
-//   in  kept_pages[count], kept_frames[count], kept_alive[count], kept_taken[count];   out page_block, alive, taken: the map as it was
+//   in  kept_pages[count], kept_frames[count], kept_alive[count];   out page_block, alive: the map as it was
 __kernel void restore_pages(__global const uint* kept_pages, const uint count, __global const int* kept_frames,
-                            __global const ulong* kept_alive, __global const ulong* kept_taken, __global int4* page_block,
-                            __global ulong* alive, __global ulong* taken) {
+                            __global const ulong* kept_alive, __global int4* page_block, __global ulong* alive) {
   const uint n = get_global_id(0);
   if (n >= count) return;
   const uint page = kept_pages[n];
   page_block[page].w = kept_frames[n];
   alive[page] = kept_alive[n];
-  taken[page] = kept_taken[n];
 }
 
 // One work item handles a surfel that back_up_pages has kept.

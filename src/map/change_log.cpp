@@ -53,7 +53,10 @@ void ChangeLog::divide(const std::vector<std::uint64_t>& readers, std::uint64_t 
     else
       merge(n);
   }
-  while (sets_.size() >= kMostSets) merge(1);
+  while (sets_.size() >= kMostSets) {
+    add(sets_[1].alive, sets_[0].alive);  // its reader is still there
+    merge(1);
+  }
   sets_.push_back({now, now, {}, std::move(alive)});
   divided_ = true;
 }
@@ -82,6 +85,13 @@ ChangeLog::Difference ChangeLog::since(std::uint64_t since) const {
   }
   difference.known.assign(difference.changed.size(), ~Word{0});
   return difference;
+}
+
+ChangeLog::Words ChangeLog::known(std::size_t pages) const {
+  Words known(pages, 0);
+  for (const Set& set : sets_) add(set.alive, known);
+  known.resize(pages);
+  return known;
 }
 
 std::size_t ChangeLog::bytes() const {

@@ -38,6 +38,9 @@ class ChangeLog {
   /// of earlier frames are contained as well, and all slots may be known.
   Difference since(std::uint64_t since) const;
 
+  /// Slots of the pages 0, 1, ... `pages` - 1 whose surfels some reader may know.
+  Words known(std::size_t pages) const;
+
   std::size_t bytes() const;
 
  private:

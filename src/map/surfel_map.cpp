@@ -52,7 +52,6 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       kept_surfel_slots_(commands),
       kept_frames_(commands),
       kept_alive_(commands),
-      kept_taken_(commands),
       kept_slots_(commands),
       kept_surfels_(commands),
       changed_words_(commands),
@@ -162,7 +161,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   order_.resize(count);
   if (count <= commands_.shape().sort_alone)
     commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
-                  taken(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
+                  alive_(), reserved(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
   else
     sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
   add_pages(missing_.read(cell_count));
@@ -170,7 +169,7 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   const std::size_t items = window_pages() * (commands_.shape().many_items ? PAGE_SLOTS : 1);
   commands_.run(stage, "fill_pages", items, PAGE_GROUP, window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
-                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), taken(), surfels_());
+                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), reserved(), surfels_());
   size_ += count;
 }
 
@@ -183,7 +182,7 @@ void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cell
   commands_.run(stage, "count_cells", chunks, group, cells(), count, chunks, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, taken(), free_before_());
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), reserved(), free_before_());
   lists_.prefix_sums(stage, free_before_, pages);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, chunks,
                 cell_begin_(), missing_());
@@ -315,11 +314,11 @@ void SurfelMap::reserve_ids(const std::vector<std::uint64_t>& readers, std::uint
     index_.release(~std::uint64_t{0});
     return;
   }
-  const cl_uint frame =
-      reserves_ids_ ? static_cast<cl_uint>(readers.front()) : ~cl_uint{0};  // at first, all slots that are not alive are free
-  if (!reserves_ids_) reserved_.allocate(alive_.size());
-  const auto pages = static_cast<cl_uint>(index_.end());
-  commands_.run("changes", "reserve_slots", pages, kGroup, pages, page_block_(), alive_(), frame, reserved_());
+  if (!reserves_ids_) {
+    reserved_.allocate(alive_.size());
+    reserved_.fill("changes", 0, alive_.size());
+  }
+  reserved_.write(log_.known(index_.end()));
   reserves_ids_ = true;
   index_.release(readers.front());
 }

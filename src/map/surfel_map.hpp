@@ -1,5 +1,5 @@
 /// The map in device buffers: the world has blocks, a block has pages, a page has PAGE_SLOTS slots for surfels. A surfel's slot is its id.
-/// While someone follows the changes, slots of removed surfels are reserved until these readers know of the removal.
+/// While someone follows the changes, slots of removed surfels that these readers know are reserved until they know of the removal.
 /// kernels/common/surfels.cl describes the buffers.
 #pragma once
 
@@ -85,8 +85,8 @@ class SurfelMap {
   /// @param readers  the maps that they have, ascending; none: nothing is logged, as at first. @param now  number of this map
   void log_changes(const std::vector<std::uint64_t>& readers, std::uint64_t now);
 
-  /// The same as log_changes(); in addition, no id is given again that a surfel has lost after the first of the readers' maps. Without
-  /// readers, ids are given again at once, as at first.
+  /// The same as log_changes(); in addition, no id of a surfel that is in one of the readers' maps is given again. Without readers, ids are
+  /// given again at once, as at first.
   void reserve_ids(const std::vector<std::uint64_t>& readers, std::uint64_t now);
 
   /// @throws Error  replace() would refuse one of the surfels
@@ -148,7 +148,7 @@ class SurfelMap {
   void close_window();
   void add_pages(const std::vector<cl_uint>& missing);
   std::size_t allocated_bytes() const;
-  const cl::Buffer& taken() const { return reserves_ids_ ? reserved_() : alive_(); }      ///< slots that no new surfel may take
+  const cl::Buffer& reserved() const { return reserves_ids_ ? reserved_() : alive_(); }   ///< no new surfel may take these slots
   std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
   void sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
@@ -165,7 +165,7 @@ class SurfelMap {
   // Indexed by slot or page
   DeviceArray<cl_uint4> surfels_;
   DeviceArray<cl_ulong> alive_, changed_;
-  DeviceArray<cl_ulong> reserved_;  ///< alive ones, and those whose removal has not been told. Only with reserves_ids_
+  DeviceArray<cl_ulong> reserved_;  ///< those whose surfels a reader knows, alive or not. Only with reserves_ids_
   DeviceArray<cl_int4> page_block_;
 
   // This frame's window: its pages, sorted by cell
@@ -184,7 +184,7 @@ class SurfelMap {
   Undo undo_;
   DeviceArray<cl_uint> kept_pages_, kept_count_, kept_surfel_slots_;
   DeviceArray<cl_int> kept_frames_;
-  DeviceArray<cl_ulong> kept_alive_, kept_taken_, kept_slots_;
+  DeviceArray<cl_ulong> kept_alive_, kept_slots_;
   DeviceArray<cl_uint4> kept_surfels_;
 
   // Changes

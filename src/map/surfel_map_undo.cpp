@@ -34,7 +34,6 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
   kept_pages_.resize(count);
   kept_frames_.resize(count);
   kept_alive_.resize(count);
-  kept_taken_.resize(count);
   kept_slots_.resize(count);
   undo_.most_kept += freed_count;
   kept_surfels_.grow(undo_.most_kept + 1, undo_.room, kSpare);
@@ -46,8 +45,8 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
   }
   const std::size_t items = count * (commands_.shape().many_items ? PAGE_SLOTS : 1);
   commands_.run(stage, "back_up_pages", items, PAGE_GROUP, pages_list_(), static_cast<cl_uint>(count), static_cast<cl_int>(first), freed(),
-                page_block_(), alive_(), taken(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room), kept_pages_(), kept_frames_(),
-                kept_alive_(), kept_taken_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
+                page_block_(), alive_(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room), kept_pages_(), kept_frames_(),
+                kept_alive_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
   undo_.kept_pages = count;
 }
 
@@ -89,8 +88,7 @@ void SurfelMap::restore() {
   changed_.fill(stage, 0, changed_.size());
   const auto count = static_cast<cl_uint>(undo_.kept_pages);
   if (count > 0) {
-    commands_.run(stage, "restore_pages", count, kGroup, kept_pages_(), count, kept_frames_(), kept_alive_(), kept_taken_(), page_block_(),
-                  alive_(), taken());
+    commands_.run(stage, "restore_pages", count, kGroup, kept_pages_(), count, kept_frames_(), kept_alive_(), page_block_(), alive_());
     const cl_uint kept = std::min(kept_count_.read_one(0), static_cast<cl_uint>(undo_.room));
     if (kept > 0) commands_.run(stage, "restore_surfels", kept, kGroup, kept, kept_surfel_slots_(), kept_surfels_(), surfels_());
   }
