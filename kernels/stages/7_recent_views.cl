@@ -9,6 +9,16 @@
 
 #define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
 #define TILE_CHUNKS (TILE_ENTRIES / LANES)
+#define WORD_TILES (64 / VIEW_TILE_K)
+#define GROUP_TILES (LANES == 1 ? 1 : WORD_TILES)  // tiles that a work-group has; where it has few, there are more groups
+
+// On a CPU a work-group has one item (src/opencl/work_shape.cpp), which waits for nobody; and PoCL takes minutes to compile barriers within
+// branches and loops.
+#ifdef ON_CPU
+#define GROUP_BARRIER(flags)
+#else
+#define GROUP_BARRIER(flags) barrier(flags)
+#endif
 
 // What a work-group knows of the tiles of a word of the bit fields, and of one of them.
 typedef struct {
@@ -39,13 +49,13 @@ INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
     vstore8(vload8(row, candidates), row, own->words);
     vstore8((ulong8)(0), row, own->taken);
   }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
   if (item == 0) {
     ulong8 words = 0;
     for (int row = 0; row < VIEW_TILE; ++row) words |= vload8(row, own->words);
     own->layers = all_bits(words);
   }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
@@ -62,20 +72,48 @@ INLINE void list_entries(__local Tile* own, int3 tile) {
   if (item == items - 1) own->entry_count = count;
 }
 
-// Takes those off the list that are settled. One work item does this, and what the next function does.
-INLINE void drop_settled(__local Tile* own) {
-  uint count = 0;
-  for (uint first = 0; first < own->entry_count; first += LANES)
-    for (uint left = own->open[first / LANES]; left != 0; left &= left - 1) own->entries[count++] = own->entries[first + lowest_lane(left)];
-  own->entry_count = count;
+// Adds an entry to the bits of a tile's columns. Other work items may add theirs at the same time.
+INLINE void add_entry(__local ulong* words, int3 tile, int entry) {
+  const int column = entry / VIEW_TILE_K, bit = (tile.z * VIEW_TILE_K + entry % VIEW_TILE_K) % 64;
+  if (get_local_size(0) == 1)
+    words[column] |= 1ul << bit;
+  else
+    atomic_or((volatile __local uint*)words + 2 * column + bit / 32, 1u << (bit % 32));
+}
+
+INLINE void clear_entries(__local ulong* words, int3 tile) {
+  const ulong mask = ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64);
+  for (int column = get_local_id(0); column < TILE_COLUMNS; column += get_local_size(0)) words[column] &= ~mask;
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+}
+
+INLINE bool entry_is_open(__local const Tile* own, uint n) { return (own->open[n / LANES] >> (n % LANES) & 1) != 0; }
+
+// Takes those off the list that are settled. One work item alone goes through those that are not; of several, each has its share of the
+// list, and then of the columns.
+INLINE void drop_settled(__local Tile* own, int3 tile) {
+  const uint items = get_local_size(0);
+  if (items == 1) {
+    uint count = 0;
+    for (uint first = 0; first < own->entry_count; first += LANES)
+      for (uint left = own->open[first / LANES]; left != 0; left &= left - 1)
+        own->entries[count++] = own->entries[first + lowest_lane(left)];
+    own->entry_count = count;
+  } else {
+    clear_entries(own->words, tile);
+    for (uint n = get_local_id(0); n < own->entry_count; n += items)
+      if (entry_is_open(own, n)) add_entry(own->words, tile, own->entries[n]);
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+    list_entries(own, tile);
+  }
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
 // Puts the candidates left in the place of the tile's.
 INLINE void keep_entries(__local Tile* own, int3 tile) {
-  const int first_bit = tile.z * VIEW_TILE_K % 64;
-  for (int column = 0; column < TILE_COLUMNS; ++column) own->words[column] &= ~(((1ul << VIEW_TILE_K) - 1) << first_bit);
-  for (uint n = 0; n < own->entry_count; ++n)
-    own->words[own->entries[n] / VIEW_TILE_K] |= 1ul << (first_bit + own->entries[n] % VIEW_TILE_K);
+  clear_entries(own->words, tile);
+  for (uint n = get_local_id(0); n < own->entry_count; n += get_local_size(0)) add_entry(own->words, tile, own->entries[n]);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
 // All points near the candidates of a tile.
@@ -126,13 +164,13 @@ INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* la
                               __global const float* view_lanes, __global const ushort* depths, __local Tile* own) {
   const int item = get_local_id(0), items = get_local_size(0);
   for (int known = item; known <= PROBES; known += items) own->known_by[known] = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
   for (int part = item; part < VIEW_PARTS; part += items) {
     const ViewLanes lanes = load_view_lanes(view_lanes, part);
     const intv counts = count_known(g, tile, layer_depth, &lanes, depths, views->depth_step, own);
     for (int known = 1; known <= PROBES; ++known) atomic_or(&own->known_by[known], lane_bits(MARK(counts == known)) << (part * LANES));
   }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
   if (item != 0) return;
   uint count = 0;
   own->likely_views = 0;
@@ -143,15 +181,21 @@ INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* la
   own->view_count = count;
 }
 
-// Lists the others that may know something near a tile's candidates.
+// Lists the others that may know something near a tile's candidates. Each work item has a share of their groups, and counts what those
+// before it have.
 INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int view_groups) {
+  const int item = get_local_id(0), items = get_local_size(0), first = view_groups * item / items, last = view_groups * (item + 1) / items;
   uint count = 0;
-  for (int group = 0; group < view_groups; ++group) {
+  for (int group = 0; group < last; ++group) {
     uint left = tile_views[group];
     if (group == 0) left &= ~own->likely_views;
+    if (group < first) {
+      count += popcount(left);
+      continue;
+    }
     for (; left != 0; left &= left - 1) own->views[count++] = (ushort)(group * VIEW_GROUP + lowest_lane(left));
   }
-  own->view_count = count;
+  if (item == items - 1) own->view_count = count;
 }
 
 // Makes a work item's chunks of the entries; returns how many there are.
@@ -182,7 +226,7 @@ INLINE void ask_lattice(const Frame* f, const SeenPoints* lattice, uint chunks, 
     const intv open = lane_marks(own->open[chunk]);
     own->open[chunk] = (ushort)lane_bits(open & ~seen_before(f, lattice, center, open));
   }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
 // Takes those off a tile's list that lie at points that were taken back, and notes them. Returns whether any point near the tile's
@@ -192,14 +236,9 @@ INLINE bool set_taken_aside(const Frame* f, const SeenPoints* taken, int3 tile, 
   find_candidates_box(&f->grid, own, tile, layer_depth, f->limits.min_gap, &box);
   if (seen_in_box(f, taken, &box) == SEEN_NONE) return false;
   ask_lattice(f, taken, open_chunks(&f->grid, tile, layer_depth, own), own);
-  if (get_local_id(0) == 0) {
-    const int first_bit = tile.z * VIEW_TILE_K % 64;
-    for (uint n = 0; n < own->entry_count; ++n)
-      if ((own->open[n / LANES] >> (n % LANES) & 1) == 0)
-        own->taken[own->entries[n] / VIEW_TILE_K] |= 1ul << (first_bit + own->entries[n] % VIEW_TILE_K);
-    drop_settled(own);
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint n = get_local_id(0); n < own->entry_count; n += get_local_size(0))
+    if (!entry_is_open(own, n)) add_entry(own->taken, tile, own->entries[n]);
+  drop_settled(own, tile);
   return true;
 }
 
@@ -231,9 +270,8 @@ INLINE void ask_views(const Grid* g, int3 tile, __global const float* layer_dept
       const View view = views[own->views[n]];
       chunks = ask_view(&view, depths, chunks, own);
     }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (get_local_id(0) == 0) drop_settled(own);
-    barrier(CLK_LOCAL_MEM_FENCE);
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+    drop_settled(own, tile);
   }
 }
 
@@ -244,18 +282,29 @@ INLINE int ask_memory(const Frame* f, const SeenPoints* seen, int3 tile, __globa
   const int in_box = seen_in_box(f, seen, box);
   if (in_box == SEEN_NONE) return in_box;
   ask_lattice(f, seen, in_box == SEEN_ALL ? 0 : open_chunks(&f->grid, tile, layer_depth, own), own);
-  if (get_local_id(0) == 0) {
-    if (in_box == SEEN_ALL)
-      own->entry_count = 0;
-    else
-      drop_settled(own);
+  if (in_box != SEEN_ALL) {
+    drop_settled(own, tile);
+    return in_box;
   }
-  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) == 0) own->entry_count = 0;
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
   return in_box;
 }
 
-// One work-group has the tiles of a word of VIEW_TILE x VIEW_TILE columns, 64 / VIEW_TILE_K tiles one above the other: group
-// (tile_j words_k + w) tiles_i + tile_i.
+// Puts the tiles of a work-group back: whole words, or a part of each. Other groups have the other parts.
+INLINE void store_words(__local const Tile* own, int part, __global ulong* candidates) {
+  const int item = get_local_id(0), items = get_local_size(0);
+#if LANES == 1
+  __global ushort* parts = (__global ushort*)candidates + part;
+  for (int column = item; column < TILE_COLUMNS; column += items)
+    parts[WORD_TILES * column] = (ushort)((own->words[column] | own->taken[column]) >> (part * VIEW_TILE_K));
+#else
+  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, own->words) | vload8(row, own->taken), row, candidates);
+#endif
+}
+
+// One work-group has tiles of a word of VIEW_TILE x VIEW_TILE columns, which are WORD_TILES tiles one above the other: all of them, or one.
+// Word (tile_j words_k + w) tiles_i + tile_i is that of group 0, 1, ..., or of the groups 0 to WORD_TILES - 1, and so on.
 //   in  views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
 //       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
@@ -267,53 +316,50 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
                                 __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
                                 __global const int* taken_tables, __global const int* taken_bricks, __global ushort* tile_views,
                                 __global uchar* tile_seen, __global ulong* candidates) {
-  const int item = get_local_id(0), items = get_local_size(0), tiles_of_word = 64 / VIEW_TILE_K,
-            view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
-  const int group = get_group_id(0), tiles_i = grid_tiles(f.grid.size_i);
-  __global ulong* own_candidates = candidates + group * TILE_COLUMNS;
+  const int item = get_local_id(0), items = get_local_size(0), view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
+  const int groups = WORD_TILES / GROUP_TILES, word = get_group_id(0) / groups, part = get_group_id(0) % groups,
+            tiles_i = grid_tiles(f.grid.size_i);
+  __global ulong* own_candidates = candidates + word * TILE_COLUMNS;
   const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
   __local Tile own;
   load_words(own_candidates, &own);
   if (own.layers == 0) return;
 
-  int3 tile = (int3)(group % tiles_i, group / tiles_i / f.grid.words_k, group / tiles_i % f.grid.words_k * tiles_of_word);
-  for (const int last_tile = tile.z + tiles_of_word - 1; tile.z <= last_tile; ++tile.z) {
+  int3 tile = (int3)(word % tiles_i, word / tiles_i / f.grid.words_k, word / tiles_i % f.grid.words_k * WORD_TILES + part * GROUP_TILES);
+  for (const int last_tile = tile.z + GROUP_TILES - 1; tile.z <= last_tile; ++tile.z) {
     if (tile_layers(own.layers, tile) == 0) continue;
-    const int tile_number = (tile.y * f.grid.words_k * tiles_of_word + tile.z) * tiles_i + tile.x;
+    const int tile_number = (tile.y * f.grid.words_k * WORD_TILES + tile.z) * tiles_i + tile.x;
     __global ushort* own_views = tile_views + tile_number * view_groups;
     list_entries(&own, tile);
-    barrier(CLK_LOCAL_MEM_FENCE);
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
     if (f.has_taken && set_taken_aside(&f, &taken, tile, layer_depth, &own)) {
       for (int n = item; n < view_groups; n += items) own_views[n] = 0;  // no candidate may be left that sets them
       if (item == 0) tile_seen[tile_number] = SEEN_NONE;
     }
     if (item == 0) own.view_count = own.likely_views = 0;
     if (view_count > 0 && own.entry_count != 0) list_likely_views(&f.grid, tile, layer_depth, views, view_lanes, depths, &own);
-    barrier(CLK_LOCAL_MEM_FENCE);
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
     ask_views(&f.grid, tile, layer_depth, views, depths, &own);
     if (own.entry_count != 0) {
-      if (item == 0) keep_entries(&own, tile);
-      barrier(CLK_LOCAL_MEM_FENCE);
+      keep_entries(&own, tile);
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
       const int in_box = f.has_seen ? ask_memory(&f, &seen, tile, layer_depth, &box, &own) : SEEN_NONE;
       if (item == 0) tile_seen[tile_number] = (uchar)in_box;
     }
     if (own.entry_count != 0) {
-      if (item == 0) keep_entries(&own, tile);
-      barrier(CLK_LOCAL_MEM_FENCE);
+      keep_entries(&own, tile);
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
       for (int n = item; n < view_groups; n += items)
         own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, &box);
-      barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-      if (item == 0) list_views(&own, own_views, view_groups);
-      barrier(CLK_LOCAL_MEM_FENCE);
+      GROUP_BARRIER(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+      list_views(&own, own_views, view_groups);
+      GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
       ask_views(&f.grid, tile, layer_depth, views, depths, &own);
     }
-    if (item == 0) keep_entries(&own, tile);
-    barrier(CLK_LOCAL_MEM_FENCE);
+    keep_entries(&own, tile);
   }
 
-  for (int row = item; row < VIEW_TILE; row += items) vstore8(vload8(row, own.words) | vload8(row, own.taken), row, own_candidates);
+  store_words(&own, part, own_candidates);
 }
