@@ -116,7 +116,7 @@ INLINE void keep_entries(__local Tile* own, int3 tile) {
   GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
-// All points near the candidates of a tile.
+// All points near the candidates of a tile. Every work item of the group must ask for them.
 INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 tile, __global const float* layer_depth, float min_gap,
                                 Box* box) {
   const ulong mask = ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64);
@@ -134,6 +134,7 @@ INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 til
   const int3 corner = tile * (int3)(VIEW_TILE, VIEW_TILE, VIEW_TILE_K);
   *box = tile_box(g, layer_depth, corner + (int3)(lowest_lane(columns), lowest_lane(rows), lowest_lane(layers)),
                   corner + 31 - (int3)((int)clz(columns), (int)clz(rows), (int)clz(layers)), min_gap);
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);  // all have read the words, which may change now
 }
 
 // The centre of a tile's entry, camera frame.
