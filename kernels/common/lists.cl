@@ -1,13 +1,13 @@
 // Lists from bit fields and counts, in an order that does not depend on the number of threads: counts, their prefix sum, then the entries.
 // A total that does not fit is UINT_MAX, so that the host can refuse it. add_sat would make every sum wait longer for the one before it.
 
-// One work item handles a chunk of WORD_CHUNK words: it counts their set bits.
+// One work item handles `size` words, a chunk: it counts their set bits.
 //   in  words[count];   out counts[chunks]
-__kernel void count_bits(__global const ulong* words, const uint count, __global uint* counts) {
-  const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
+__kernel void count_bits(__global const ulong* words, const uint count, const uint size, __global uint* counts) {
+  const uint chunk = get_global_id(0), begin = size * chunk;
   if (begin >= count) return;
   uint sum = 0;
-  for (uint n = begin; n < min(begin + WORD_CHUNK, count); ++n) sum += (uint)popcount(words[n]);
+  for (uint n = begin; n < min(begin + size, count); ++n) sum += (uint)popcount(words[n]);
   counts[chunk] = sum;
 }
 
@@ -101,12 +101,12 @@ __kernel void scan_by_group(__global uint* values, const uint count) {
   if (item == 0) values[count] = (uint)min(before, (ulong)UINT_MAX);
 }
 
-// One work item handles a chunk of WORD_CHUNK words: it lists their set bits.
+// One work item handles `size` words, a chunk: it lists their set bits.
 //   in  words[count];  offsets[chunks]: prefix sum of count_bits';   out list: the numbers 64 n + bit of set bits
-__kernel void list_bits(__global const ulong* words, const uint count, __global const uint* offsets, __global uint* list) {
-  const uint chunk = get_global_id(0), begin = WORD_CHUNK * chunk;
+__kernel void list_bits(__global const ulong* words, const uint count, const uint size, __global const uint* offsets, __global uint* list) {
+  const uint chunk = get_global_id(0), begin = size * chunk;
   if (begin >= count) return;
   uint at = offsets[chunk];
-  for (uint n = begin; n < min(begin + WORD_CHUNK, count); ++n)
+  for (uint n = begin; n < min(begin + size, count); ++n)
     for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
 }

@@ -39,9 +39,6 @@ namespace frontier_surfels {
 #define SCAN_STRIP 4
 #define MOST_SCAN_ITEMS 256
 
-// Words whose set bits one work item lists.
-#define WORD_CHUNK 16
-
 // Number of surfels in a page of the map. Words about a page have one bit for each of them.
 #define PAGE_SLOTS 64
 

@@ -43,14 +43,14 @@ void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::siz
 
 std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
   if (count == 0) return 0;
-  const std::size_t chunks = (count + WORD_CHUNK - 1) / WORD_CHUNK;
-  const auto words = static_cast<cl_uint>(count);
+  const auto words = static_cast<cl_uint>(count), size = static_cast<cl_uint>(commands_.shape().list_chunk);
+  const std::size_t chunks = (count + size - 1) / size;
   if (count <= commands_.shape().list_alone) return list_few_bits(stage, bits, words, list);
   counts_.resize(chunks + 1);
-  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, counts_());
+  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, size, counts_());
   const std::uint32_t total = scan(stage, counts_, chunks);
   list.resize(total);
-  if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, counts_(), list());
+  if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, size, counts_(), list());
   return total;
 }
 

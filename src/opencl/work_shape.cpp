@@ -15,6 +15,7 @@ WorkShape shape_for(const Device& device) {
     shape.scan_alone = 16;
     shape.scan_by_group = 1 << 14;
     shape.scan_group = std::min<std::size_t>(MOST_SCAN_ITEMS, device.device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
+    shape.list_chunk = 4;
     shape.sort_chunks = 512;
     shape.sort_group = 64;
   } else if (device.prefers_one_item) {

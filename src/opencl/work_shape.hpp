@@ -17,6 +17,7 @@ struct WorkShape {
   std::size_t scan_by_group = 0;  ///< so many by one work-group
   std::size_t scan_group = 1;     ///< work items of this group
   std::size_t list_alone = 0;     ///< the bits of so many words are listed by one work item
+  std::size_t list_chunk = 16;    ///< otherwise each of many lists those of so many words
   std::size_t sort_alone = 0;     ///< so many new surfels are sorted by one work item
   std::size_t sort_chunks = 64;   ///< otherwise so many work items sort them by block, each its share
   std::size_t sort_group = 1;     ///< in groups of so many
