@@ -19,9 +19,10 @@ namespace frontier_surfels {
 #define TILE_J 8
 #define TILE_K 32
 
-// Tile of the grid that has one list of the kept views that may know something there. VIEW_TILE_K is a quarter of a word.
+// Tile of the grid that has one list of the kept views that may know something there. A word of columns has WORD_TILES tiles.
 #define VIEW_TILE 8
 #define VIEW_TILE_K 16
+#define WORD_TILES (64 / VIEW_TILE_K)
 
 // Rows of the grid that one work item observes. On a device that wants many work items each has half a word of one column.
 #define SPACE_ROWS 8

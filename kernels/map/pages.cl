@@ -107,12 +107,13 @@ INLINE void note_filled(const Window* window, uint page, uint cell, ulong filled
 // has a page, and a work item a slot.
 //   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
 //       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
-//   i/o page_block, alive, changed, surfels: the map;  reserved: may be the same buffer as `alive`
+//       reserved: may be the same buffer as `alive`
+//   i/o page_block, alive, changed, surfels: the map
 __kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
                          __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
-                         __global ulong* reserved, __global uint4* surfels) {
+                         __global const ulong* reserved, __global uint4* surfels) {
   const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0), known = count - new_count;
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];

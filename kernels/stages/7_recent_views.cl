@@ -9,7 +9,6 @@
 
 #define TILE_ENTRIES (TILE_COLUMNS * VIEW_TILE_K)  // maximum number of candidates of a tile
 #define TILE_CHUNKS (TILE_ENTRIES / LANES)
-#define WORD_TILES (64 / VIEW_TILE_K)
 #define GROUP_TILES (LANES == 1 ? 1 : WORD_TILES)  // tiles that a work-group has; where it has few, there are more groups
 
 // On a CPU a work-group has one item (src/opencl/work_shape.cpp), which waits for nobody; and PoCL takes minutes to compile barriers within
@@ -58,6 +57,9 @@ INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
   GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
 
+// The bits of a tile's layers in the words of its columns.
+INLINE ulong tile_mask(int3 tile) { return ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64); }
+
 INLINE uint tile_layers(ulong word, int3 tile) { return (uint)(word >> (tile.z * VIEW_TILE_K % 64)) & ((1u << VIEW_TILE_K) - 1); }
 
 // Lists a tile's candidates, by columns. Each work item has a share of the columns, and counts what those before it have.
@@ -82,7 +84,7 @@ INLINE void add_entry(__local ulong* words, int3 tile, int entry) {
 }
 
 INLINE void clear_entries(__local ulong* words, int3 tile) {
-  const ulong mask = ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64);
+  const ulong mask = tile_mask(tile);
   for (int column = get_local_id(0); column < TILE_COLUMNS; column += get_local_size(0)) words[column] &= ~mask;
   GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
 }
@@ -119,7 +121,7 @@ INLINE void keep_entries(__local Tile* own, int3 tile) {
 // All points near the candidates of a tile. Every work item of the group must ask for them.
 INLINE void find_candidates_box(const Grid* g, __local const Tile* own, int3 tile, __global const float* layer_depth, float min_gap,
                                 Box* box) {
-  const ulong mask = ((1ul << VIEW_TILE_K) - 1) << (tile.z * VIEW_TILE_K % 64);
+  const ulong mask = tile_mask(tile);
   ulong8 of_columns = 0;
   uint rows = 0, columns = 0;
   for (int row = 0; row < VIEW_TILE; ++row) {

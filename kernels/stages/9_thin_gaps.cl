@@ -15,7 +15,7 @@ INLINE void find_views_around(const Grid* g, __global const View* views, __globa
   around->tile_views = tile_views;
   around->view_groups = view_groups;
   around->tile_count = 0;
-  const int tiles_i = grid_tiles(g->size_i), tiles_k = 64 / VIEW_TILE_K * g->words_k;
+  const int tiles_i = grid_tiles(g->size_i), tiles_k = WORD_TILES * g->words_k;
   int tiles[LANES];
   vstorev((v.j / VIEW_TILE * tiles_k + v.k / VIEW_TILE_K) * tiles_i + v.i / VIEW_TILE, 0, tiles);
   for (int n = 0; n < LANES; ++n) {

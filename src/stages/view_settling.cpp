@@ -8,9 +8,9 @@ void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews&
                           Candidates& candidates) {
   const int count = views.prepare();
   const std::size_t columns = tile_columns(frame.grid), group = commands_.shape().heavy_group;
-  const std::size_t groups = commands_.shape().many_items ? columns * (64 / VIEW_TILE_K) : columns;
-  tile_views_.resize(std::max<std::size_t>(columns * (64 / VIEW_TILE_K) * views.view_groups(), 1));  // kernels take no empty buffer
-  tile_seen_.resize(columns * (64 / VIEW_TILE_K));
+  const std::size_t groups = commands_.shape().many_items ? columns * WORD_TILES : columns;
+  tile_views_.resize(std::max<std::size_t>(columns * WORD_TILES * views.view_groups(), 1));  // kernels take no empty buffer
+  tile_seen_.resize(columns * WORD_TILES);
   if (count == 0 && seen.empty()) return;
   commands_.run("recent_views", "settle_candidates", groups * group, group, frame, views.views(), views.view_lanes(),
                 static_cast<cl_int>(count), views.depths(), camera.layer_depth()(), seen.slots(), seen.tables(), seen.brick_words(),
