@@ -9,8 +9,8 @@ target_include_directories(frontier_surfels_ros PUBLIC src)
 find_package(octomap REQUIRED)  # the octree for planners
 find_package(octomap_msgs QUIET)  # where it exists, the node publishes the octree as well
 if(octomap_msgs_FOUND)
-  target_compile_definitions(frontier_surfels_ros PRIVATE FRONTIER_SURFELS_OCTOMAP_MSGS)
-  target_include_directories(frontier_surfels_ros SYSTEM PRIVATE ${octomap_msgs_INCLUDE_DIRS})
+  target_compile_definitions(frontier_surfels_ros PUBLIC FRONTIER_SURFELS_OCTOMAP_MSGS)
+  target_include_directories(frontier_surfels_ros SYSTEM PUBLIC ${octomap_msgs_INCLUDE_DIRS})
 endif()
 target_include_directories(frontier_surfels_ros SYSTEM PUBLIC ${OCTOMAP_INCLUDE_DIRS})
 target_link_libraries(frontier_surfels_ros PUBLIC frontier_surfels ${catkin_LIBRARIES} ${OCTOMAP_LIBRARIES} ${OpenCV_LIBS} Threads::Threads)

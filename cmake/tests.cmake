@@ -12,7 +12,7 @@ file(MAKE_DIRECTORY ${POCL_CACHE})
 # Tests of these names need the tools: frames of the synthetic room, recordings, scores. All others are of the core alone.
 set(NEED_TOOLS "/(ros/test_.*|test_(coverage|exact_test|folder_source|mapper|object|octomap_truth|real_data|sampling|summary|synthetic|tools|truth).*)\\.cpp$")
 # These of ROS need only the node's library: ThreadSanitizer's build of them is then half as large.
-set(NEED_NO_RECORDINGS "/ros/test_(inbox|map_publisher|worker)\\.cpp$")
+set(NEED_NO_RECORDINGS "/ros/test_(inbox|map_publisher|octomap_message|worker)\\.cpp$")
 file(GLOB TEST_SOURCES CONFIGURE_DEPENDS test/test_*.cpp)
 if(FRONTIER_SURFELS_WITH_ROS)
   file(GLOB ROS_TEST_SOURCES CONFIGURE_DEPENDS test/ros/test_*.cpp)

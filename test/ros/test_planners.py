@@ -2,6 +2,7 @@
 """What planners ask and follow: states, rays, views, the grid of states, clusters, the octree and the projected map."""
 import os
 import shutil
+import struct
 import tempfile
 
 import numpy
@@ -59,6 +60,38 @@ class Grid:
 
     def known(self):
         return {block: cells.tolist() for block, cells in self.blocks.items() if cells.any()}
+
+
+class Octree:
+    """An octomap_msgs/Octomap, read from its bytes: a planner's nodes were not built with ours."""
+
+    def __init__(self, message):
+        buffer, self.at = message._buff, 4
+
+        def take(form):
+            values = struct.unpack_from('<' + form, buffer, self.at)
+            self.at += struct.calcsize('<' + form)
+            return values[0] if len(values) == 1 else values
+
+        self.stamp = rospy.Time(*take('II'))
+        self.frame_id = take(f'{take("I")}s').decode()
+        self.binary = take('B')
+        self.kind = take(f'{take("I")}s')
+        self.resolution = take('d')
+        end = take('I') + self.at
+        self.free = self.occupied = 0
+        self.read_node(take, 16)
+        assert self.at == end == len(buffer), (self.at, end)
+
+    def read_node(self, take, height):
+        """A node's log-odds, a bit for each of its children, and the children. Leaves stand for 8^height cells."""
+        log_odds, children = take('fB')
+        for _ in range(bin(children).count('1')):
+            self.read_node(take, height - 1)
+        if children == 0 and log_odds > 0:
+            self.occupied += 8 ** height
+        elif children == 0:
+            self.free += 8 ** height
 
 
 class Listener:
@@ -210,6 +243,28 @@ class Planners(MapperTest):
         gone = clusters.wait(self.mapper.map()[0])
         self.assertEqual(len(gone.clusters), 0)
         self.assertTrue(set(ids) <= set(sum((list(m.removed) for m in clusters.messages), [])))
+
+    def test_octree_of_a_topic(self):
+        if '/mapper/octomap_full' not in dict(rospy.get_published_topics()):
+            self.skipTest('~octomap_full is not built, because octomap_msgs was not found')
+        states, trees = Listener(self, 'states_update', StatesUpdate), []
+        subscriber = rospy.Subscriber('mapper/octomap_full', rospy.AnyMsg, trees.append)
+        self.addCleanup(subscriber.unregister)
+        grid, stamps = Grid(), set()
+        for step in range(3):
+            report = self.map_walk(1, first=step)
+            states.wait(report.sequence)
+            last = wait_until(lambda: next((t for t in map(Octree, trees) if t.stamp >= report.header.stamp), None), what='an octree')
+            stamps.add(last.stamp)
+        for message in states.messages:
+            grid.apply(message)
+        self.assertEqual(len(stamps), 3)
+        self.assertEqual(trees[-1]._connection_header['type'], 'octomap_msgs/Octomap')
+        self.assertEqual(trees[-1]._connection_header['md5sum'], '9a45536b45c5e409cd49f04bb2d9999f')  # of octomap_msgs 0.3
+        self.assertEqual((last.frame_id, last.binary, last.kind), ('map', 0, b'OcTree'))
+        self.assertAlmostEqual(last.resolution, grid.resolution)
+        self.assertEqual(last.free, len(grid.centres(FREE)))
+        self.assertEqual(last.occupied, len(grid.centres(OCCUPIED)))
 
     def test_octree_and_projected_map(self):
         folder = tempfile.mkdtemp()

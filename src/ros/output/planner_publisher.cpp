@@ -231,6 +231,7 @@ void PlannerPublisher::publish_octomap([[maybe_unused]] const std::deque<Pushed>
   for (const Pushed& pushed : queue)
     if (pushed.states.since == octomap_.sequence()) octomap_.apply(pushed.states);
   if (octomap_.sequence() != space_.sequence()) octomap_.apply(space_.whole());
+  if (octomap_.empty()) return;  // OctoMap cannot read a tree without nodes
   octomap_msgs::Octomap message;
   message.header = header();
   message.binary = false;
