@@ -26,7 +26,8 @@ void expect_at_most(const Trips& trips, const Trips& most) {
   EXPECT_LE(trips.uploads, most.uploads);
 }
 
-/// Frames in which surfels were split, space was taken back or blocks were added to the memory of seen points take more, and are left out.
+/// Frames in which surfels were split, space was taken back, now or earlier, or blocks were added to the memory of seen points take more,
+/// and are left out; so are those with many more candidates than the frame before.
 /// @return number of frames that were compared
 std::size_t compare(int lanes, const Trips& most) {
   Config config = undecimated();
@@ -45,9 +46,9 @@ std::size_t compare(int lanes, const Trips& most) {
   return compared;
 }
 
-TEST(MapperTrips, OfACpu) { EXPECT_GT(compare(16, {5, 25, 3, 0, 2}), 3u); }
+TEST(MapperTrips, OfACpu) { EXPECT_GT(compare(16, {4, 25, 3, 0, 2}), 3u); }
 
-TEST(MapperTrips, OfAGraphicsProcessor) { EXPECT_GT(compare(1, {5, 60, 8, 0, 2}), 3u); }
+TEST(MapperTrips, OfAGraphicsProcessor) { EXPECT_GT(compare(1, {2, 60, 8, 0, 2}), 3u); }
 
 }  // namespace
 }  // namespace frontier_surfels

@@ -18,12 +18,11 @@ void check(const CameraSetup& camera, double observed_density) {
   const Field<char> observed = random_field(fixture.grid(), observed_density, random);
   BitField observed_bits(fixture.commands());
   fixture.write(observed_bits, observed);
-  DeviceArray<cl_uint> counters(fixture.commands());
-  counters.write({1, 2, 3});
   Candidates found(fixture.commands());
-  found.find(fixture.frame(), observed_bits, counters);
+  found.visit_counts().write(std::vector<cl_uint>(COUNTS, 5));
+  found.find(fixture.frame(), observed_bits);
   expect_equal("candidates", candidates(observed), fixture.read(found));
-  EXPECT_EQ(counters.read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the next stage's counters are not cleared";
+  EXPECT_EQ(found.visit_counts().read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the next stage's counters are not cleared";
 }
 
 TEST(StageCandidates, RandomFields) {

@@ -23,6 +23,7 @@ struct CreationFixture : FrameFixture {
       : FrameFixture(config),
         observed(commands()),
         known(commands()),
+        leaving_words(commands()),
         candidates(commands()),
         list(commands(), lists()),
         settling(commands()),
@@ -30,15 +31,19 @@ struct CreationFixture : FrameFixture {
 
   /// Lists the candidates and filters them. @param with_known  whether the filter uses K~
   void filter(bool with_known = true) {
-    list.list(frame(), camera(), observed, candidates);
-    creation.filter(frame(), list, candidates, with_known ? &known : nullptr);
+    list_all(
+        [&] {
+          list.list(frame(), camera(), observed, candidates);
+          creation.filter(frame(), list, candidates, with_known ? &known : nullptr);
+        },
+        {&list.voxels(), &creation.chosen()});
   }
 
   /// Voxels of the new surfels, 64 word + bit each.
   std::vector<std::uint32_t> created_voxels() const {
-    const std::vector<std::uint32_t> listed = list.voxels().read(list.count());
+    const std::vector<std::uint32_t> listed = list.voxels().read();
     std::vector<std::uint32_t> voxels;
-    for (const std::uint32_t number : creation.chosen().read(creation.count())) voxels.push_back(listed[number]);
+    for (const std::uint32_t number : creation.chosen().read()) voxels.push_back(listed[number]);
     return voxels;
   }
   Bits created() const {
@@ -47,7 +52,13 @@ struct CreationFixture : FrameFixture {
     return read_tile_words(words);
   }
 
-  BitField observed, known;
+  /// No surfel leaves the map.
+  const BitField& leaving() {
+    leaving_words.write(std::vector<cl_ulong>(map().window_pages() + 1, 0));
+    return leaving_words;
+  }
+
+  BitField observed, known, leaving_words;
   Candidates candidates;
   CandidateList list;
   ViewSettling settling;
@@ -251,16 +262,18 @@ std::size_t check_creation(CameraSetup camera, int old_surfels, double density, 
   fixture.map().replace(random_surfels(grid, Eigen::Isometry3d::Identity(), old_surfels, 2, 2, random), 1);
   if (old_surfels > 10) fixture.access().kill(some_slots(fixture.map().download(), 7));
   const Scene scene = prepare(camera, fixture, density, random);
-  fixture.map().reserve(fixture.creation.count());
+  fixture.map().reserve(fixture.creation.chosen().count());
   const std::vector<Surfel> there = fixture.map().download();
   const std::size_t before = fixture.map().size();
   std::set<std::uint32_t> old_slots;
   for (const Surfel& surfel : there) old_slots.insert(surfel.id);
   EXPECT_EQ(old_slots.size(), before);
 
-  EXPECT_EQ(fixture.creation.count(), scene.voxels.size());
+  EXPECT_EQ(fixture.creation.chosen().count(), scene.voxels.size());
   fixture.creation.create(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), fixture.settling,
-                          fixture.list, fixture.map());
+                          fixture.list, fixture.leaving(), fixture.map());
+  fixture.commands().wait();
+  fixture.creation.insert(fixture.map());
   EXPECT_EQ(fixture.map().size(), before + scene.voxels.size());
   const std::size_t count = scene.voxels.size();
   const std::vector<std::uint32_t> slots = fixture.access().find_slots(fixture.creation.new_surfels().surfels.read(count),

@@ -102,6 +102,48 @@ TEST(StageLists, SetBitsInOrder) {
   }
 }
 
+/// A list of whose length the host is not told has as many of the bits as there was room for, and the next time it has all.
+TEST(StageLists, SetBitsIntoTheRoomThatThereIs) {
+  Random random(4);
+  Commands& commands = test_commands();
+  Lists lists(commands);
+  DeviceList list(commands);
+  std::size_t cut = 0;
+  for (const std::size_t size : {0, 1, 64, 65, 500, 3000, 100, 20000, 200, 0, 1, 300000}) {
+    if (reference::small_tests() && size > 500) continue;
+    SCOPED_TRACE(std::to_string(size) + " words");
+    std::vector<std::uint64_t> words(size, 0);
+    std::vector<std::uint32_t> expected;
+    for (std::size_t bit = 0; bit < 64 * size; ++bit) {
+      if (!random.chance(0.3)) continue;
+      words[bit / 64] |= std::uint64_t{1} << (bit % 64);
+      expected.push_back(static_cast<std::uint32_t>(bit));
+    }
+    DeviceArray<cl_ulong> bits(commands);
+    bits.write(words);
+    const auto make = [&] {
+      lists.list_bits("test", bits, size, list);
+      list.read_length_later();
+      commands.wait();
+      list.note_length();
+      return list.is_whole();
+    };
+    const bool whole = make();
+    EXPECT_EQ(whole, expected.size() <= list.room());
+    EXPECT_EQ(list.count(), std::min(list.room(), expected.size()));
+    if (commands.shape().asks_lengths) {
+      EXPECT_EQ(list.room(), expected.size());
+    }
+    EXPECT_TRUE(list.read() == std::vector<std::uint32_t>(expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(list.count())));
+    cut += whole ? 0 : 1;
+    EXPECT_TRUE(make());
+    EXPECT_TRUE(list.read() == expected);
+  }
+  if (!commands.shape().asks_lengths) {
+    EXPECT_GT(cut, reference::small_tests() ? 0u : 2u) << "there was always room";
+  }
+}
+
 /// Enough words that the bits are counted before they are listed, on PoCL as well.
 TEST(StageLists, SetBitsOfManyWords) {
   Random random(3);

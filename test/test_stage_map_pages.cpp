@@ -67,7 +67,8 @@ class Pages {
   }
 
   /// Inserts random surfels into a few cells of the window.
-  void insert(int count, int cells) {
+  /// @param leave  share of the surfels that leave the map, unless it is negative: after the new ones have been sorted early
+  void insert(int count, int cells, double leave = -1) {
     std::vector<cl_uint> some;
     for (int n = 0; n < cells; ++n) some.push_back(cells_[random_.whole(0, static_cast<int>(cells_.size()) - 1)]);
     std::vector<cl_uint4> surfels;
@@ -82,7 +83,10 @@ class Pages {
     new_surfels.write(surfels);
     new_cells.write(where);
     map().reserve(count);
-    map().insert("test", new_surfels, new_cells, count);
+    if (leave < 0)
+      map().insert("test", new_surfels, new_cells, count);
+    else
+      insert_while_others_leave(new_surfels, new_cells, count, leave);
     std::set<std::uint32_t> before;
     for (const auto& [slot, surfel] : book_.surfels) before.insert(slot);
     check_insertion(surfels, where, fixture_.access().find_slots(surfels, where, before));
@@ -153,6 +157,28 @@ class Pages {
  private:
   static constexpr double kBlock = 0.5;
 
+  void insert_while_others_leave(const DeviceArray<cl_uint4>& new_surfels, const DeviceArray<cl_uint>& new_cells, std::size_t count,
+                                 double share) {
+    const std::vector<std::uint32_t> pages = fixture_.access().window_pages();
+    std::vector<cl_ulong> words(pages.size() + 1, 0);
+    std::vector<std::uint32_t> leaving;
+    for (std::size_t n = 0; n < pages.size(); ++n)
+      for (std::uint32_t bit = 0; bit < PAGE_SLOTS; ++bit)
+        if (book_.surfels.count(PAGE_SLOTS * pages[n] + bit) != 0 && random_.chance(share)) {
+          words[n] |= cl_ulong{1} << bit;
+          leaving.push_back(PAGE_SLOTS * pages[n] + bit);
+        }
+    DeviceArray<cl_ulong> bits(fixture_.commands());
+    bits.write(words);
+    DeviceArray<cl_uint> length(fixture_.commands());
+    length.write({static_cast<cl_uint>(count)});
+    ASSERT_TRUE(map().sort_early("test", {new_cells, length(), count + 1, count}, bits));
+    fixture_.commands().wait();
+    fixture_.access().kill(leaving);
+    for (const std::uint32_t slot : leaving) book_.surfels.erase(slot);
+    map().insert_sorted("test", new_surfels, count);
+  }
+
   void note(std::uint32_t slot, const Packed& surfel) {
     EXPECT_TRUE(book_.surfels.emplace(slot, surfel).second) << "slot " << slot << " was not free";
     book_.pages[slot / PAGE_SLOTS] = fixture_.access().block_of_slot(slot);
@@ -217,6 +243,23 @@ TEST(StageMapPages, InsertedSurfelsTakeFreeSlotsInOrder) {
       pages.insert(count / 3, 5);
       pages.expect_as_in_book();
     }
+}
+
+/// Slots of surfels that have not left the map yet count as free. A second insertion in the same frame cannot be prepared.
+TEST(StageMapPages, NewSurfelsAreSortedBeforeOthersHaveLeft) {
+  for (const int there : {0, 1, 3000})
+    for (const double share : {0.0, 0.3, 1.0})
+      for (const int count : {0, 1, 700, 20000}) {
+        SCOPED_TRACE(std::to_string(there) + " surfels and " + std::to_string(count) + " more, of the former leave " +
+                     std::to_string(share));
+        Pages pages(static_cast<unsigned>(there + count));
+        pages.fill(there);
+        pages.remove(0.3);
+        pages.open_window(4);
+        pages.insert(count, 40, share);
+        pages.insert(count / 3, 5);
+        pages.expect_as_in_book();
+      }
 }
 
 TEST(StageMapPages, ThousandsIntoOneBlock) {

@@ -103,6 +103,26 @@ TEST(StageRecentViews, NoViews) {
   EXPECT_EQ(check(cameras().front(), 2, 0, Content::mixed, 0.3), 0);
 }
 
+/// Where the visit has found surfels to be split, it is repeated: no candidate is left for the stages that would look at them in vain.
+TEST(StageRecentViews, NoCandidateIsLeftWhereSurfelsMustBeSplit) {
+  for (const CameraSetup& camera : cameras()) {
+    Random random(3);
+    FrameFixture fixture(camera.config);
+    fixture.views().set_current(random_image(camera, Content::mixed, random), Eigen::Isometry3d::Identity());
+    ASSERT_TRUE(fixture.views().keep_current());
+    fixture.begin(random_image(camera, Content::all_valid, random), random.pose(0.5, 0.6));
+    Candidates left(fixture.commands());
+    const Field<char> candidates = random_field(fixture.grid(), 0.3, random);
+    fixture.write(left, candidates);
+    std::vector<cl_uint> counts(COUNTS, 0);
+    counts[COUNT_LARGE] = 1;
+    left.visit_counts().write(counts);
+    ViewSettling settling(fixture.commands());
+    settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), left);
+    expect_equal("candidates left", Field<char>(fixture.grid(), 0), fixture.read(left));
+  }
+}
+
 /// Only the newest views count.
 TEST(StageRecentViews, RingForgets) {
   for (const int kept : {1, 2, 3}) check(cameras().front(), 7, kept, Content::mixed, 0.3);

@@ -63,6 +63,9 @@ struct Scene {
   void settle(Candidates& candidates) {
     settling.settle(frame, fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), candidates);
   }
+  void list_candidates() {
+    fixture.list_all([this] { list.list(frame, fixture.camera(), fixture.observed, fixture.candidates); }, {&list.voxels()});
+  }
   SeenBits seen_bits() { return bits_in_window(fixture.seen(), fixture.map().window()); }
   SeenBits taken_bits() { return bits_in_window(fixture.taken(), fixture.map().window()); }
   Vector3d to_world(const Vector3d& p_camera) const { return now.T_world_camera * p_camera; }
@@ -145,7 +148,7 @@ TEST(StageTakenPoints, KeptViewsCloseNoGapAtTakenCandidates) {
       fixture.write(fixture.observed, observed);
       fixture.write(fixture.candidates, all);
       scene.settle(fixture.candidates);
-      scene.list.list(scene.frame, fixture.camera(), fixture.observed, fixture.candidates);
+      scene.list_candidates();
       close_thin_gaps(fixture.commands(), scene.frame, fixture.camera(), fixture.space.column_end(), fixture.views(),
                       scene.settling.tile_views(), fixture.taken(), scene.list, fixture.candidates);
       const SeenBits taken = scene.taken_bits();
@@ -204,13 +207,13 @@ Created created_with(const CameraSetup& camera, bool views, bool taken, std::map
   fixture.write(fixture.observed, observed);
   fixture.write(fixture.candidates, candidates);
   scene.settle(fixture.candidates);
-  scene.list.list(scene.frame, fixture.camera(), fixture.observed, fixture.candidates);
+  scene.list_candidates();
   Creation creation(fixture.commands(), fixture.lists());
-  const std::size_t count = creation.filter(scene.frame, scene.list, fixture.candidates, nullptr);
-  fixture.map().reserve(count);
+  fixture.list_all([&] { creation.filter(scene.frame, scene.list, fixture.candidates, nullptr); }, {&creation.chosen()});
+  const std::size_t count = creation.chosen().count();
   creation.create(scene.frame, fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), scene.settling, scene.list,
-                  fixture.map());
-  const std::vector<std::uint32_t> listed = scene.list.voxels().read(scene.list.count()), chosen = creation.chosen().read(count);
+                  fixture.visit.removed(), fixture.map());
+  const std::vector<std::uint32_t> listed = scene.list.voxels().read(), chosen = creation.chosen().read();
   const std::vector<cl_uint4> surfels = creation.new_surfels().surfels.read(count);
   const std::vector<cl_uint> cells = creation.new_surfels().cells.read(count);
   Created created;
@@ -272,8 +275,9 @@ void check_visit(CameraSetup camera, Content content, double full_taken, bool re
   for_each_voxel(candidates, [&](int i, int j, int k) { candidates(i, j, k) = candidates(i, j, k) && !observed(i, j, k); });
   fixture.write(fixture.observed, observed);
   fixture.write(fixture.candidates, candidates);
-  const SurfelVisit::Found found = fixture.visit.visit(scene.frame, fixture.camera(), fixture.observed, fixture.space.column_end(),
-                                                       fixture.views(), fixture.taken(), fixture.map(), fixture.candidates);
+  fixture.visit.visit(scene.frame, fixture.camera(), fixture.observed, fixture.space.column_end(), fixture.views(), fixture.taken(),
+                      fixture.map(), fixture.candidates);
+  const SurfelVisit::Found found = SurfelVisit::read_found(fixture.candidates, fixture.map());
   const std::vector<std::uint32_t> slots = fixture.access().slots(fixture.visit.removed());
   const std::set<std::uint32_t> removed(slots.begin(), slots.end());
   EXPECT_EQ(found.removed, removed.size());

@@ -113,7 +113,8 @@ Tally check(CameraSetup camera, const Setup& setup, double observed_density, boo
   fixture.write(fixture.candidates, all);
 
   fixture.settling.settle(fixture.frame(), fixture.camera(), fixture.views(), fixture.seen(), fixture.taken(), fixture.candidates);
-  fixture.list.list(fixture.frame(), fixture.camera(), fixture.observed, fixture.candidates);
+  fixture.list_all([&] { fixture.list.list(fixture.frame(), fixture.camera(), fixture.observed, fixture.candidates); },
+                   {&fixture.list.voxels()});
   close_thin_gaps(fixture.commands(), fixture.frame(), fixture.camera(), fixture.space.column_end(), fixture.views(),
                   fixture.settling.tile_views(), fixture.taken(), fixture.list, fixture.candidates);
   Tally tally;

@@ -1,5 +1,12 @@
 // Lists from bit fields and counts, in an order that does not depend on the number of threads: counts, their prefix sum, then the entries.
 // A total that does not fit is UINT_MAX, so that the host can refuse it. add_sat would make every sum wait longer for the one before it.
+//
+// A list may be longer than its room, because the host does not wait for its length. Kernels that go through it are launched for its whole
+// room and find its length in length[0]: number of its entries, which length[1] exceeds if there was no room for all.
+INLINE void note_length(uint total, uint room, __global uint* length) {
+  length[0] = min(total, room);
+  length[1] = total;
+}
 
 // One work item handles `size` words, a chunk: it counts their set bits.
 //   in  words[count];   out counts[chunks]
@@ -12,15 +19,15 @@ __kernel void count_bits(__global const ulong* words, const uint count, const ui
 }
 
 // One work item does all: it counts and lists the set bits, where a launch takes longer than that.
-//   in  words[count];   out list[room]: the numbers 64 n + bit of set bits, as many as there is room for;  total: number of all set bits
-__kernel void list_few_bits(__global const ulong* words, const uint count, __global uint* list, const uint room, __global uint* total) {
+//   in  words[count];   out list[room]: the numbers 64 n + bit of set bits;  length[2]
+__kernel void list_few_bits(__global const ulong* words, const uint count, __global uint* list, const uint room, __global uint* length) {
   if (get_global_id(0) > 0) return;
   uint at = 0;
   for (uint n = 0; n < count; ++n) {
     for (ulong left = words[n]; left != 0; left &= left - 1, ++at)
       if (at < room) list[at] = 64 * n + lowest_bit(left);
   }
-  *total = at;
+  note_length(at, room, length);
 }
 
 // One work item handles a chunk of SCAN_CHUNK values: it adds them up.
@@ -102,11 +109,14 @@ __kernel void scan_by_group(__global uint* values, const uint count) {
 }
 
 // One work item handles `size` words, a chunk: it lists their set bits.
-//   in  words[count];  offsets[chunks]: prefix sum of count_bits';   out list: the numbers 64 n + bit of set bits
-__kernel void list_bits(__global const ulong* words, const uint count, const uint size, __global const uint* offsets, __global uint* list) {
+//   in  words[count];  offsets[chunks + 1]: prefix sum of count_bits', and the total
+//   out list[room]: the numbers 64 n + bit of set bits;  length[2]
+__kernel void list_bits(__global const ulong* words, const uint count, const uint size, __global const uint* offsets, __global uint* list,
+                        const uint room, __global uint* length) {
   const uint chunk = get_global_id(0), begin = size * chunk;
   if (begin >= count) return;
   uint at = offsets[chunk];
-  for (uint n = begin; n < min(begin + size, count); ++n)
-    for (ulong left = words[n]; left != 0; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
+  for (uint n = begin; n < min(begin + size, count) && at < room; ++n)
+    for (ulong left = words[n]; left != 0 && at < room; left &= left - 1) list[at++] = 64 * n + lowest_bit(left);
+  if (begin + size >= count) note_length(offsets[chunk + 1], room, length);
 }

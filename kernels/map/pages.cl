@@ -3,7 +3,9 @@
 // New surfels take the free slots of their block's pages, page after page, lowest slot first, in the order of their list: this does not
 // depend on the number of threads. For that they are sorted by cell (block of the window), and keep the list's order in each cell.
 //
-// A slot is free if it is neither in `alive` nor in `reserved`. Where no ids are reserved, both are the same buffer.
+// A slot is free if it is neither in `alive` nor in `reserved`. Where no ids are reserved, both are the same buffer, and has_reserved is 0.
+//
+// The new surfels' number is in length[0], as in common/lists.cl. They may be sorted while some surfels have not left the map yet.
 
 // One work item handles an entry of a list of bits in pages: it becomes a slot of the map.
 //   in  pages;   i/o list[count]: before: 64 n + bit for page pages[n]; after: slots
@@ -15,33 +17,37 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
 INLINE uint chunk_begin(uint count, uint chunk, uint chunks) { return (uint)((ulong)count * chunk / chunks); }
 
 // One work item handles a chunk of the new surfels.
-//   in  new_cells[count];   i/o histogram[cells][chunks]: before: 0; after: how many of each chunk go to each cell
-__kernel void count_cells(__global const uint* new_cells, const uint count, const uint chunks, __global uint* histogram) {
-  const uint chunk = get_global_id(0);
+//   in  new_cells[length[0]];   i/o histogram[cells][chunks]: before: 0; after: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, __global const uint* length, const uint chunks, __global uint* histogram) {
+  const uint chunk = get_global_id(0), count = length[0];
   if (chunk >= chunks) return;
   for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
     ++histogram[chunks * new_cells[n] + chunk];
 }
 
 // One work item handles a chunk of the new surfels.
-//   in  new_cells[count];   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends
-//   out order[count]: new surfels sorted by cell
-__kernel void sort_by_cell(__global const uint* new_cells, const uint count, const uint chunks, __global uint* histogram,
+//   in  new_cells[length[0]];   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends
+//   out order[length[0]]: new surfels sorted by cell
+__kernel void sort_by_cell(__global const uint* new_cells, __global const uint* length, const uint chunks, __global uint* histogram,
                            __global uint* order) {
-  const uint chunk = get_global_id(0);
+  const uint chunk = get_global_id(0), count = length[0];
   if (chunk >= chunks) return;
   for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
     order[histogram[chunks * new_cells[n] + chunk]++] = n;
 }
 
-INLINE ulong taken_slots(uint page, __global const ulong* alive, __global const ulong* reserved) { return alive[page] | reserved[page]; }
+// Number of free slots of a page once the surfels in `leaving` have left it.
+INLINE uint free_slots_of(uint page, ulong leaving, __global const ulong* alive, int has_reserved, __global const ulong* reserved) {
+  return PAGE_SLOTS - (uint)popcount((alive[page] & ~leaving) | (has_reserved ? reserved[page] : 0));
+}
 
 // One work item handles a page: it counts its free slots.
-//   in  pages[count]: of the window, by cell;  alive, reserved;   out free_slots[count]
-__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* reserved,
-                         __global uint* free_slots) {
+//   in  pages[count]: of the window, by cell;  leaving[count]: a bit for each surfel that is going to be removed;  alive, reserved
+//   out free_slots[count]
+__kernel void count_free(__global const uint* pages, const uint count, __global const ulong* leaving, __global const ulong* alive,
+                         const int has_reserved, __global const ulong* reserved, __global uint* free_slots) {
   const uint n = get_global_id(0);
-  if (n < count) free_slots[n] = PAGE_SLOTS - (uint)popcount(taken_slots(pages[n], alive, reserved));
+  if (n < count) free_slots[n] = free_slots_of(pages[n], leaving[n], alive, has_reserved, reserved);
 }
 
 // Pages that a block needs for new surfels in addition to its free slots.
@@ -63,10 +69,12 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
 }
 
 // One work item does all of the above for few new surfels, where launches take longer than that.
-__kernel void sort_few(__global const uint* new_cells, const uint count, __global const uint* pages, const uint page_count,
-                       __global const ulong* alive, __global const ulong* reserved, __global const uint* cell_pages, const uint cells,
-                       __global uint* free_before, __global uint* cell_begin, __global uint* missing, __global uint* order) {
+__kernel void sort_few(__global const uint* new_cells, __global const uint* length, __global const uint* pages, const uint page_count,
+                       __global const ulong* leaving, __global const ulong* alive, const int has_reserved, __global const ulong* reserved,
+                       __global const uint* cell_pages, const uint cells, __global uint* free_before, __global uint* cell_begin,
+                       __global uint* missing, __global uint* order) {
   if (get_global_id(0) > 0) return;
+  const uint count = length[0];
   for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
   for (uint n = 0; n < count; ++n) ++cell_begin[new_cells[n] + 1];
   __global uint* next = missing;  // in each cell
@@ -78,7 +86,7 @@ __kernel void sort_few(__global const uint* new_cells, const uint count, __globa
   uint free_slots = 0;
   for (uint n = 0; n < page_count; ++n) {
     free_before[n] = free_slots;
-    free_slots += PAGE_SLOTS - (uint)popcount(taken_slots(pages[n], alive, reserved));
+    free_slots += free_slots_of(pages[n], leaving[n], alive, has_reserved, reserved);
   }
   free_before[page_count] = free_slots;
   for (uint cell = 0; cell < cells; ++cell)
@@ -118,7 +126,7 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
   if (n >= count) return;
   const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
   const uint first = first_of_page(n, cell, known, new_ranks, cell_begin, cell_pages, free_before);
-  const ulong before = n < known ? taken_slots(page, alive, reserved) : 0;  // added pages are free, whatever they have been before
+  const ulong before = n < known ? alive[page] | reserved[page] : 0;  // added pages are free, whatever they have been before
 #if LANES == 1
   __local SharedWord filled;
   const uint slot = get_local_id(0), at = first + (uint)popcount(~before & ((1ul << slot) - 1));

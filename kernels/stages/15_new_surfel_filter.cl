@@ -1,13 +1,15 @@
 // New surfel filter - paper 3.5: candidates that are known, or whose directions cancel, make no surfel.
 
-// One work item handles a chunk of LANES listed candidates; there are work items for whole words of 64.
-//   in  voxels[count], directions: of find_directions;  candidates: bit field by tiles, as 32-bit halves: those that close_gaps has left
+// One work item handles a chunk of LANES listed candidates; there are work items for all `words` of 64 that the list has room for.
+//   in  voxels[length[0]], directions: of find_directions;  candidates: bit field by tiles, as 32-bit halves: those that close_gaps has
+//   left
 //       known: bit field K~, as 32-bit halves, if has_known
-//   out kept[(count + 63) / 64 words]: a bit for each listed candidate that makes a surfel, as 32-bit halves; at width 1 zero before
-__kernel void filter_candidates(const Frame f, __global const int* voxels, const int count, __global const float* directions,
-                                __global const int* candidates, const int has_known, __global const int* known, __global uint* kept) {
-  const int chunk = get_global_id(0);
-  if (chunk >= (count + 63) / 64 * (64 / LANES)) return;
+//   out kept[words]: a bit for each listed candidate that makes a surfel, as 32-bit halves; at width 1 zero before
+__kernel void filter_candidates(const Frame f, __global const int* voxels, __global const uint* length, const int words,
+                                __global const float* directions, __global const int* candidates, const int has_known,
+                                __global const int* known, __global uint* kept) {
+  const int chunk = get_global_id(0), count = (int)length[0];
+  if (chunk >= words * (64 / LANES)) return;
   uint open_bits = 0;
   if (chunk * LANES < count) {
     intv exist;

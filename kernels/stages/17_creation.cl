@@ -64,16 +64,17 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
 
 // One work item handles a chunk of LANES new surfels.
 //   in  seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
-//       created[count]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
+//       created[length[0]]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
 //       views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this frame's among them
-//   out new_surfels[count], new_cells[count]: packed for the map, and their cells of the window
+//   out new_surfels[length[0]], new_cells[length[0]]: packed for the map, and their cells of the window
 __kernel void create_surfels(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
                              __global const ushort* depths, __global const float* layer_depth, __global const int* seen_slots,
                              __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
                              __global const int* taken_tables, __global const int* taken_bricks, __global const uchar* tile_seen,
-                             __global const int* created, const int count, __global const int* voxels, __global const int* around,
-                             __global const float* directions, __global uint4* new_surfels, __global int* new_cells) {
-  const int chunk = get_global_id(0);
+                             __global const int* created, __global const uint* length, __global const int* voxels,
+                             __global const int* around, __global const float* directions, __global uint4* new_surfels,
+                             __global int* new_cells) {
+  const int chunk = get_global_id(0), count = (int)length[0];
   if (chunk * LANES >= count) return;
   intv exist, ragged = 0;
   const intv numbers = load_chunk(created, count, chunk, &exist);

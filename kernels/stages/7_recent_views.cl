@@ -306,25 +306,34 @@ INLINE void store_words(__local const Tile* own, int part, __global ulong* candi
 #endif
 }
 
+INLINE void clear_words(__local Tile* own, int part, __global ulong* candidates) {
+  for (int column = get_local_id(0); column < TILE_COLUMNS; column += get_local_size(0)) own->words[column] = own->taken[column] = 0;
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+  store_words(own, part, candidates);
+}
+
 // One work-group has tiles of a word of VIEW_TILE x VIEW_TILE columns, which are WORD_TILES tiles one above the other: all of them, or one.
 // Word (tile_j words_k + w) tiles_i + tile_i is that of group 0, 1, ..., or of the groups 0 to WORD_TILES - 1, and so on.
-//   in  views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
+//   in  counts[COUNTS]: of 5_visit
+//       views[view_count];  view_lanes: the same by fields (common/views.cl);  depths: their images;  layer_depth[size_k]
 //       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //   out tile_views[tiles_j][tiles_k][tiles_i][groups of views]: for tiles with candidates left, a bit for each view that may know something
 //       near them
 //       tile_seen[tiles_j][tiles_k][tiles_i]: for the same tiles, how many of the lattice points near them are seen
-//   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared, unless they were taken back
+//   i/o candidates: bit field by tiles: those that a view knows, or that were seen before, are cleared, unless they were taken back. If
+//       5_visit has found surfels to be split, all are cleared: all this is repeated after that
 __kernel void settle_candidates(const Frame f, __global const View* views, __global const float* view_lanes, const int view_count,
                                 __global const ushort* depths, __global const float* layer_depth, __global const int* seen_slots,
                                 __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
                                 __global const int* taken_tables, __global const int* taken_bricks, __global ushort* tile_views,
-                                __global uchar* tile_seen, __global ulong* candidates) {
+                                __global uchar* tile_seen, __global const uint* counts, __global ulong* candidates) {
   const int item = get_local_id(0), items = get_local_size(0), view_groups = (view_count + VIEW_GROUP - 1) / VIEW_GROUP;
   const int groups = WORD_TILES / GROUP_TILES, word = get_group_id(0) / groups, part = get_group_id(0) % groups,
             tiles_i = grid_tiles(f.grid.size_i);
   __global ulong* own_candidates = candidates + word * TILE_COLUMNS;
   const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
   __local Tile own;
+  if (counts[COUNT_LARGE] > 0) return clear_words(&own, part, own_candidates);
   load_words(own_candidates, &own);
   if (own.layers == 0) return;
 

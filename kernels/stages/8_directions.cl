@@ -40,13 +40,13 @@ INLINE int observed_around(const Grid* g, __global const ulong* observed, int i,
 }
 
 // One work item handles a chunk of LANES listed candidates.
-//   in  voxels[count]: their numbers;  observed: bit field C~;  layer_depth[size_k]
+//   in  voxels[length[0]]: their numbers;  observed: bit field C~;  layer_depth[size_k]
 //   out around[LANES chunks]: observed_around each candidate
 //       directions[chunks][3][LANES]: x, y and z of the normal of a surfel there, camera frame, not normalised: the sum of the unit vectors
 //       to the observed ones of the 26 voxels around it
 __kernel void find_directions(const Frame f, __global const float* layer_depth, __global const ulong* observed, __global const int* voxels,
-                              const int count, __global int* around, __global float* directions) {
-  const int chunk = get_global_id(0);
+                              __global const uint* length, __global int* around, __global float* directions) {
+  const int chunk = get_global_id(0), count = (int)length[0];
   if (chunk * LANES >= count) return;
   intv exist;
   const Voxels v = voxels_of(&f.grid, load_chunk(voxels, count, chunk, &exist));

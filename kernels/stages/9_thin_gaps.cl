@@ -43,13 +43,14 @@ intv any_view_knows(const ViewsAround* around, __global const ushort* depths, Po
 
 // One work item handles a chunk of LANES listed candidates.
 //   in  depth, column_end: of 1_observed_space;  views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this
-//       frame's among them;  slots, tables, bricks: of points that were taken back;  voxels[count], directions: of find_directions
+//       frame's among them;  slots, tables, bricks: of points that were taken back;  voxels[length[0]], directions: of find_directions
 //   i/o candidates: bit field by tiles, as 32-bit halves: those with known space again `min_gap` behind them are cleared
 __kernel void close_gaps(const Frame f, __global const View* views, __global const ushort* tile_views, const int view_groups,
                          __global const ushort* depths, __global const float* layer_depth, __global const float* depth,
                          __global const int* column_end, __global const int* slots, __global const int* tables, __global const int* bricks,
-                         __global const int* voxels, const int count, __global const float* directions, __global uint* candidates) {
-  const int chunk = get_global_id(0);
+                         __global const int* voxels, __global const uint* length, __global const float* directions,
+                         __global uint* candidates) {
+  const int chunk = get_global_id(0), count = (int)length[0];
   if (chunk * LANES >= count) return;
   intv exist;
   const intv numbers = load_chunk(voxels, count, chunk, &exist);

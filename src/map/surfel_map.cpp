@@ -47,6 +47,8 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       free_before_(commands),
       missing_(commands),
       order_(commands),
+      new_count_(commands),
+      nothing_(commands),
       kept_pages_(commands),
       kept_count_(commands),
       kept_surfel_slots_(commands),
@@ -154,18 +156,27 @@ void SurfelMap::reserve(std::size_t additional) {
 void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
   if (count == 0) return;
   if (!new_ranks_.empty()) list_window();  // an earlier insertion has added pages, which are not sorted by cell yet
-  const auto cell_count = static_cast<cl_uint>(window_.cells());
-  free_before_.resize(window_pages() + 1);
-  cell_begin_.resize(cell_count + 1);
-  missing_.resize(cell_count);
-  order_.resize(count);
-  if (count <= commands_.shape().sort_alone)
-    commands_.run(stage, "sort_few", 1, 1, cells(), static_cast<cl_uint>(count), pages_list_(), static_cast<cl_uint>(window_pages()),
-                  alive_(), reserved(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(), order_());
-  else
-    sort_by_cell(stage, cells, static_cast<cl_uint>(count), cell_count);
-  add_pages(missing_.read(cell_count));
+  new_count_.resize(1);
+  new_count_.fill(stage, static_cast<cl_uint>(count), 1);
+  nothing_.resize(window_pages() + 1);
+  nothing_.fill(stage, 0, window_pages() + 1);
+  missing_told_ = nullptr;
+  sort(stage, {cells, new_count_(), count, count}, nothing_);
+  insert_sorted(stage, surfels, count);
+}
 
+bool SurfelMap::sort_early(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
+  missing_told_ = nullptr;
+  if (!new_ranks_.empty()) return false;
+  sort(stage, cells, leaving);
+  missing_told_ = missing_.read_later(window_.cells());
+  return true;
+}
+
+void SurfelMap::insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count) {
+  if (count == 0) return;
+  add_pages(missing_told_ != nullptr ? *missing_told_ : missing_.read(window_.cells()));
+  missing_told_ = nullptr;
   const std::size_t items = window_pages() * (commands_.shape().many_items ? PAGE_SLOTS : 1);
   commands_.run(stage, "fill_pages", items, PAGE_GROUP, window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
@@ -173,20 +184,34 @@ void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, 
   size_ += count;
 }
 
-void SurfelMap::sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count) {
-  const auto pages = static_cast<cl_uint>(window_pages());
+void SurfelMap::sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
+  const auto cell_count = static_cast<cl_uint>(window_.cells()), pages = static_cast<cl_uint>(window_pages());
+  free_before_.resize(pages + 1);
+  cell_begin_.resize(cell_count + 1);
+  missing_.resize(cell_count);
+  order_.resize(cells.room);
+  const std::size_t alone = commands_.shape().sort_alone;
+  if (alone == 0 || cells.expected > alone) return sort_by_cell(stage, cells, leaving);
+  commands_.run(stage, "sort_few", 1, 1, cells.cells(), cells.length, pages_list_(), pages, leaving(), alive_(),
+                static_cast<cl_int>(reserves_ids_), reserved(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(),
+                order_());
+}
+
+void SurfelMap::sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
+  const auto cell_count = static_cast<cl_uint>(window_.cells()), pages = static_cast<cl_uint>(window_pages());
   const std::size_t bins = commands_.shape().sort_chunks * cell_count, group = commands_.shape().sort_group;
   const auto chunks = static_cast<cl_uint>(commands_.shape().sort_chunks);
   histogram_.resize(bins + 1);
   histogram_.fill(stage, 0, bins);
-  commands_.run(stage, "count_cells", chunks, group, cells(), count, chunks, histogram_());
+  commands_.run(stage, "count_cells", chunks, group, cells.cells(), cells.length, chunks, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, alive_(), reserved(), free_before_());
+  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, leaving(), alive_(), static_cast<cl_int>(reserves_ids_),
+                reserved(), free_before_());
   lists_.prefix_sums(stage, free_before_, pages);
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, chunks,
                 cell_begin_(), missing_());
-  commands_.run(stage, "sort_by_cell", chunks, group, cells(), count, chunks, histogram_(), order_());
+  commands_.run(stage, "sort_by_cell", chunks, group, cells.cells(), cells.length, chunks, histogram_(), order_());
 }
 
 /// Appends new pages to the window. @param missing  number of new pages for each cell

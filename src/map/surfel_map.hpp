@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,8 +52,23 @@ class SurfelMap {
   /// Makes room for `additional` more surfels in this window.
   void reserve(std::size_t additional);
 
-  /// Puts surfels into the map. @param cells  each surfel's cell of the window
+  /// Puts surfels into the map, and waits for the device on the way. @param cells  each surfel's cell of the window
   void insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count);
+
+  /// Surfels that the map is to get, while only the device knows their number.
+  struct NewCells {
+    const DeviceArray<cl_uint>& cells;  ///< each surfel's cell of the window
+    const cl::Buffer& length;           ///< [1]: their number
+    std::size_t room, expected;         ///< number that it cannot exceed, and about that which is to be expected
+  };
+
+  /// The first half of insert(), which does not change the map, ahead of a wait for the device: insert_sorted() then need not wait.
+  /// @param leaving  surfels that will have left the map by then: a word for each page of the window
+  /// @return false if insert() must be called, because the window has got pages in this frame; nothing was done
+  bool sort_early(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
+
+  /// The other half, after that wait. @param count  the number of the surfels that were sorted
+  void insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count);
 
   /// Counts surfels that a kernel has marked as changed; back_up() makes room for them.
   void marked(std::size_t count) { undo_.most_kept += count; }
@@ -150,7 +166,8 @@ class SurfelMap {
   std::size_t allocated_bytes() const;
   const cl::Buffer& reserved() const { return reserves_ids_ ? reserved_() : alive_(); }   ///< no new surfel may take these slots
   std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
-  void sort_by_cell(const char* stage, const DeviceArray<cl_uint>& cells, cl_uint count, cl_uint cell_count);
+  void sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
+  void sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
 
   Commands& commands_;
@@ -178,7 +195,9 @@ class SurfelMap {
   SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_, new_ranks_list_;
 
   // Insertion
-  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_;
+  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_, new_count_;
+  DeviceArray<cl_ulong> nothing_;  ///< no surfel of any page of the window
+  std::shared_ptr<const std::vector<cl_uint>> missing_told_;
 
   // What a failed frame has overwritten
   Undo undo_;

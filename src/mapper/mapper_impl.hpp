@@ -97,7 +97,7 @@ struct Mapper::Impl {
   Report update(const DepthFrame& input);
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   double seen_spacing(const Camera& camera) const;
-  SurfelVisit::Found visit_surfels(const Frame& frame, const Camera& camera);
+  SurfelVisit::Found propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);

@@ -1,5 +1,6 @@
 /// The flow chart of a frame: the paper's stages, and ours, in the order in which they run.
 #include <chrono>
+#include <limits>
 
 #include "frame/working_image.hpp"
 #include "map/view_blocks.hpp"
@@ -30,6 +31,8 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   try {
     return update(input);
   } catch (const std::exception&) {
+    list.voxels().expect_nothing();  // room for many candidates may have been too much for the device
+    creation.chosen().expect_nothing();
     try {
       map.roll_back();
     } catch (const std::exception&) {  // the next call tries again
@@ -61,43 +64,14 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Taking back - ours: is there evidence that space behind measured surfaces, which was known, is unknown again?
   taking_back.look(camera, views, seen, &frame);
 
-  // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
-  // surviving surfel needs no new one
-  SurfelVisit::Found found = visit_surfels(frame, camera);
-
-  // Space is taken back. That is rare, and only then the visit depends on it: so the visit is not kept waiting for the evidence, and is
-  // repeated where it should have been. The surfels that it has marked for labels too many then leave the map, which marks them as well
-  report.taken_back = taking_back.update(camera, map.window(), image, views, seen, &frame);
-  if (frame.takes_back) found = visit_surfels(frame, camera);
-  report.in_view = found.in_view;
-
-  // Surfels that are too large for this view are split - 3.4. Then the smaller ones are visited
-  if (found.large > 0) {
-    report.split = splitting.split(frame, visit.large(), map);
-    found = visit_surfels(frame, camera);
-  }
-
-  // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
-  settling.settle(frame, camera, views, seen, taking_back.taken(), candidates);
-  list.list(frame, camera, observed.bits(), candidates);
-  close_thin_gaps(commands, frame, camera, observed.column_end(), views, settling.tile_views(), taking_back.taken(), list, candidates);
-
-  // Known space K~ from the surfels, for the candidates that are left - 3.2, Algorithm 1, eq. (5)-(8). It is not needed as long as no view
-  // has been forgotten: what no view has seen is unknown then
-  const BitField* known = nullptr;
-  if (!config.seen_points && !views.complete()) {
-    if (!known_space) known_space.emplace(commands, lists);
-    known = &known_space->compute(frame, visit.in_view(), candidates, map);
-  }
-
-  // New surfel filter - 3.5. The map's own memory is enlarged before anything is removed
-  report.created = creation.filter(frame, list, candidates, known);
-  map.reserve(report.created);
+  // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split
+  const SurfelVisit::Found found = propose_changes(image, camera, frame, report);
+  map.reserve(report.created);  // the map's own memory is enlarged before anything is removed
 
   // Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16)
   remove_surfels(commands, visit.removed(), found.removed, map);
   report.removed = found.removed;
-  creation.create(frame, camera, views, seen, taking_back.taken(), settling, list, map);
+  creation.insert(map);
 
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
@@ -127,10 +101,68 @@ double Mapper::Impl::seen_spacing(const Camera& camera) const {
   return config.seen_spacing > 0 ? config.seen_spacing : default_seen_spacing(camera.grid());
 }
 
-/// Finds the candidates, and then visits the surfels, which clears the candidates in their voxels.
-SurfelVisit::Found Mapper::Impl::visit_surfels(const Frame& frame, const Camera& camera) {
-  candidates.find(frame, observed.bits(), visit.counters());
-  return visit.visit(frame, camera, observed.bits(), observed.column_end(), views, taking_back.taken(), map, candidates);
+/// The device does all of it before the host asks what has come of it. In few frames it has to be done again: surfels were too large, space
+/// is taken back, or there were far more candidates than in the last frame.
+SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
+  bool is_judged = false;  // the evidence for taking back
+  const auto judge = [&] {
+    report.taken_back = taking_back.update(camera, map.window(), image, views, seen, &frame);
+    is_judged = true;
+  };
+  if (taking_back.has_taken()) judge();  // else it hardly ever changes anything, and nothing is kept waiting for it
+
+  for (;;) {
+    // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
+    // surviving surfel needs no new one
+    candidates.find(frame, observed.bits());
+    visit.visit(frame, camera, observed.bits(), observed.column_end(), views, taking_back.taken(), map, candidates);
+
+    // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
+    settling.settle(frame, camera, views, seen, taking_back.taken(), candidates);
+    list.list(frame, camera, observed.bits(), candidates);
+    close_thin_gaps(commands, frame, camera, observed.column_end(), views, settling.tile_views(), taking_back.taken(), list, candidates);
+
+    // Known space K~ from the surfels, for the candidates that are left - 3.2, Algorithm 1, eq. (5)-(8). It is not needed as long as no
+    // view has been forgotten: what no view has seen is unknown then
+    const BitField* known = nullptr;
+    if (!config.seen_points && !views.complete()) {
+      if (!known_space) known_space.emplace(commands, lists);
+      known = &known_space->compute(frame, visit.in_view(), candidates, map);
+    }
+
+    // New surfel filter, and new surfels - 3.5, eq. (14)-(16)
+    creation.filter(frame, list, candidates, known);
+    creation.create(frame, camera, views, seen, taking_back.taken(), settling, list, visit.removed(), map);
+
+    list.voxels().read_length_later();
+    creation.chosen().read_length_later();
+    const SurfelVisit::Found found = SurfelVisit::read_found(candidates, map);  // the host waits
+
+    // Space is taken back: then surfels float in it. Those that the visit has marked for labels too many leave the map, which marks them
+    // as well
+    if (!is_judged) {
+      judge();
+      if (frame.takes_back) continue;
+    }
+
+    if (report.split == 0) report.in_view = found.in_view;
+
+    // Surfels that are too large for this view are split - 3.4 -, once in a frame. Then the smaller ones are visited
+    if (found.large > 0) {
+      report.split = splitting.split(frame, visit.large(), map);
+      frame.limits.split_radius = std::numeric_limits<float>::infinity();
+      continue;
+    }
+
+    const bool all_listed = list.voxels().is_whole(), all_chosen = creation.chosen().is_whole();
+    list.voxels().note_length();
+    creation.chosen().note_length();
+    if (all_listed && all_chosen) {
+      report.created = creation.chosen().count();
+      return found;
+    }
+    if (!all_listed) creation.chosen().expect(list.voxels().total());  // not all could be chosen
+  }
 }
 
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.

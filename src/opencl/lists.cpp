@@ -9,12 +9,21 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kInitialRoom = 1 << 14;  // elements of a list
+constexpr std::size_t kLeastRoom = 1 << 12;    // elements of a list for which kernels are launched unseen
+
+/// @throws BadFrame  a list would be longer than Lists::kMaxTotal
+void refuse_too_many(const char* stage, std::uint32_t total) {
+  if (total > Lists::kMaxTotal)
+    throw BadFrame(std::string("The stage ") + stage + " would make a list of more than " + std::to_string(Lists::kMaxTotal) +
+                   " entries for this frame, because its voxels are too small for the surfels of the map; raise decimation.");
+}
 
 }  // namespace
 
 Lists::Lists(Commands& commands)
     : commands_(commands),
       counts_(commands),
+      length_(commands),
       levels_{DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands),
               DeviceArray<cl_uint>(commands), DeviceArray<cl_uint>(commands)} {}
 
@@ -22,9 +31,7 @@ std::uint32_t Lists::scan(const char* stage, DeviceArray<cl_uint>& values, std::
   if (count == 0) return 0;
   prefix_sums(stage, values, count);
   const std::uint32_t total = values.read_one(count);
-  if (total > kMaxTotal)
-    throw BadFrame(std::string("The stage ") + stage + " would make a list of more than " + std::to_string(kMaxTotal) +
-                   " entries for this frame, because its voxels are too small for the surfels of the map; raise decimation.");
+  refuse_too_many(stage, total);
   return total;
 }
 
@@ -42,29 +49,52 @@ void Lists::scan_level(const char* stage, DeviceArray<cl_uint>& values, std::siz
 }
 
 std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list) {
-  if (count == 0) return 0;
-  const auto words = static_cast<cl_uint>(count), size = static_cast<cl_uint>(commands_.shape().list_chunk);
-  const std::size_t chunks = (count + size - 1) / size;
-  if (count <= commands_.shape().list_alone) return list_few_bits(stage, bits, words, list);
-  counts_.resize(chunks + 1);
-  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, size, counts_());
-  const std::uint32_t total = scan(stage, counts_, chunks);
-  list.resize(total);
-  if (total > 0) commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, size, counts_(), list());
-  return total;
+  return list_all(stage, bits, count, list, length_);
+}
+
+void Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceList& list) {
+  list.told_ = nullptr;
+  if (commands_.shape().asks_lengths) {
+    const std::uint32_t total = list_all(stage, bits, count, list.entries_, list.length_);
+    list.room_ = total;
+    list.told_ = std::make_shared<const std::vector<cl_uint>>(2, total);
+    return;
+  }
+  list.room_ = std::max(list.next_room_, kLeastRoom);
+  list.entries_.resize(list.room_);
+  list.length_.resize(2);
+  if (count > 0) return list_into(stage, bits, count, list.entries_, list.room_, list.length_);
+  list.length_.fill(stage, 0, 2);
 }
 
 /// Lists into the room that the list has from earlier calls. If that is too small, enlarges it and lists again.
-std::uint32_t Lists::list_few_bits(const char* stage, const DeviceArray<cl_ulong>& bits, cl_uint words, DeviceArray<cl_uint>& list) {
+std::uint32_t Lists::list_all(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceArray<cl_uint>& list,
+                              DeviceArray<cl_uint>& length) {
   list.resize(kInitialRoom);
-  counts_.resize(1);
+  length.resize(2);
+  if (count == 0) {
+    length.fill(stage, 0, 2);
+    return 0;
+  }
   for (;;) {
-    const std::size_t room = list.bytes() / sizeof(cl_uint);
-    commands_.run(stage, "list_few_bits", 1, 1, bits(), words, list(), static_cast<cl_uint>(room), counts_());
-    const std::uint32_t total = counts_.read_one(0);
-    if (total <= room) return total;
+    list_into(stage, bits, count, list, list.size(), length);
+    const std::uint32_t total = length.read_one(1);
+    if (total <= list.size()) return total;
+    refuse_too_many(stage, total);
     list.resize(total);
   }
+}
+
+void Lists::list_into(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, const DeviceArray<cl_uint>& list,
+                      std::size_t room, const DeviceArray<cl_uint>& length) {
+  const auto words = static_cast<cl_uint>(count), size = static_cast<cl_uint>(commands_.shape().list_chunk),
+             most = static_cast<cl_uint>(room);
+  if (count <= commands_.shape().list_alone) return commands_.run(stage, "list_few_bits", 1, 1, bits(), words, list(), most, length());
+  const std::size_t chunks = (count + size - 1) / size;
+  counts_.resize(chunks + 1);
+  commands_.run(stage, "count_bits", chunks, kGroup, bits(), words, size, counts_());
+  prefix_sums(stage, counts_, chunks);
+  commands_.run(stage, "list_bits", chunks, kGroup, bits(), words, size, counts_(), list(), most, length());
 }
 
 }  // namespace frontier_surfels

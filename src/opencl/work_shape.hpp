@@ -11,6 +11,7 @@ namespace frontier_surfels {
 /// item. A graphics processor wants a hundred thousand work items, a work item alone is a hundred times slower there than on a CPU, and
 /// each time the host waits the device runs dry. The results are the same, bit by bit.
 struct WorkShape {
+  bool asks_lengths = true;       ///< the host waits for the length of each list: a CPU answers at once, and no work item is idle
   bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
@@ -18,7 +19,7 @@ struct WorkShape {
   std::size_t scan_group = 1;     ///< work items of this group
   std::size_t list_alone = 0;     ///< the bits of so many words are listed by one work item
   std::size_t list_chunk = 16;    ///< otherwise each of many lists those of so many words
-  std::size_t sort_alone = 0;     ///< so many new surfels are sorted by one work item
+  std::size_t sort_alone = 0;     ///< if about so many new surfels are expected, one work item sorts them; 0: never
   std::size_t sort_chunks = 64;   ///< otherwise so many work items sort them by block, each its share
   std::size_t sort_group = 1;     ///< in groups of so many
   std::size_t view_items = 64;    ///< work items that draw planners' views at a time

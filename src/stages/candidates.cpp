@@ -2,15 +2,17 @@
 
 namespace frontier_surfels {
 
-Candidates::Candidates(Commands& commands) : commands_(commands), candidates_(commands) {}
+Candidates::Candidates(Commands& commands) : commands_(commands), candidates_(commands), visit_counts_(commands) {
+  visit_counts_.allocate(COUNTS);
+  visit_counts_.fill("candidates", 0, COUNTS);
+}
 
-void Candidates::find(const Frame& frame, const BitField& observed, DeviceArray<cl_uint>& counters) {
+void Candidates::find(const Frame& frame, const BitField& observed) {
   const Grid& g = frame.grid;
   candidates_.allocate(words(g));
-  counters.resize(COUNTS);
   const std::size_t rows = VIEW_TILE * tiles(g.size_j);
   commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, frame,
-                observed(), candidates_(), counters());
+                observed(), candidates_(), visit_counts_());
 }
 
 CandidateList::CandidateList(Commands& commands, Lists& lists)
@@ -18,12 +20,12 @@ CandidateList::CandidateList(Commands& commands, Lists& lists)
 
 void CandidateList::list(const Frame& frame, const Camera& camera, const BitField& observed, const Candidates& candidates) {
   const char* stage = "directions";
-  count_ = lists_.list_bits(stage, candidates.bits(), Candidates::words(frame.grid), voxels_);
-  const std::size_t chunks = commands_.chunks(count_);
+  lists_.list_bits(stage, candidates.bits(), Candidates::words(frame.grid), voxels_);
+  const std::size_t chunks = commands_.chunks(voxels_.room());
   around_.resize(chunks * commands_.lanes());
   directions_.resize(chunks * 3 * commands_.lanes());
   commands_.run(stage, "find_directions", chunks, commands_.shape().heavy_group, frame, camera.layer_depth()(), observed(), voxels_(),
-                static_cast<cl_int>(count_), around_(), directions_());
+                voxels_.length(), around_(), directions_());
 }
 
 }  // namespace frontier_surfels

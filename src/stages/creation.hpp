@@ -16,24 +16,26 @@ class Creation {
 
   /// Chooses the candidates that become surfels: candidates that are not known and have a direction.
   /// @param known  K~ of the paper's section 3.2; null if the kept views have settled all candidates
-  /// @return number of chosen candidates
-  std::size_t filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
+  void filter(const Frame& frame, const CandidateList& list, const Candidates& candidates, const BitField* known);
 
-  /// Makes surfels of the chosen candidates and puts them into the map.
+  /// Makes surfels of the chosen candidates. The map does not change yet. @param leaving  SurfelVisit::removed()
   void create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
-              const ViewSettling& settling, const CandidateList& list, SurfelMap& map);
+              const ViewSettling& settling, const CandidateList& list, const BitField& leaving, SurfelMap& map);
 
-  std::size_t count() const { return count_; }
-  const DeviceArray<cl_uint>& chosen() const { return chosen_; }  ///< [count]: place of each in the list of candidates, ascending
+  /// Puts them into the map, once the host knows how many there are and the leaving ones have left.
+  void insert(SurfelMap& map) const;
+
+  DeviceList& chosen() { return chosen_; }  ///< place of each in the list of candidates, ascending
+  const DeviceList& chosen() const { return chosen_; }
   const NewSurfels& new_surfels() const { return new_; }
 
  private:
   Commands& commands_;
   Lists& lists_;
-  std::size_t count_ = 0;
   BitField kept_;  ///< a bit for each listed candidate
-  DeviceArray<cl_uint> chosen_;
+  DeviceList chosen_;
   NewSurfels new_;
+  bool is_sorted_ = false;  ///< the map has sorted them
 };
 
 }  // namespace frontier_surfels

@@ -19,11 +19,12 @@ class SurfelVisit {
   /// Clears the candidates in the voxels of surfels that stay. No surfel leaves the map yet.
   /// @param observed, column_end  of ObservedSpace
   /// @param taken                 TakingBack::taken()
-  /// @param candidates            of this frame; Candidates::find() must have set counters() to zero
-  Found visit(const Frame& frame, const Camera& camera, const BitField& observed, const DeviceArray<cl_int>& column_end,
-              const RecentViews& views, const SeenPoints& taken, SurfelMap& map, Candidates& candidates);
+  /// @param candidates            as Candidates::find() has left them
+  void visit(const Frame& frame, const Camera& camera, const BitField& observed, const DeviceArray<cl_int>& column_end,
+             const RecentViews& views, const SeenPoints& taken, const SurfelMap& map, Candidates& candidates);
 
-  DeviceArray<cl_uint>& counters() { return counts_; }
+  /// Waits for the device. Tells the map how many surfels were marked; must be called once after each visit().
+  static Found read_found(Candidates& candidates, SurfelMap& map);
 
   /// @name A word for each page of the map's window, a bit for each surfel
   /// @{
@@ -36,7 +37,6 @@ class SurfelVisit {
 
  private:
   Commands& commands_;
-  DeviceArray<cl_uint> counts_;
   BitField in_view_, large_, removed_;
 };
 

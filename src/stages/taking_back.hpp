@@ -56,6 +56,7 @@ class TakingBack {
 
   SeenPoints& taken() { return taken_; }
   const SeenPoints& taken() const { return taken_; }
+  bool has_taken() const { return is_on_ && !taken_.empty(); }
 
   /// @name Of the last update() that found strong evidence at all, [height][width] of the working image
   /// @{

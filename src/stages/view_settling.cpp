@@ -14,7 +14,8 @@ void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews&
   if (count == 0 && seen.empty()) return;
   commands_.run("recent_views", "settle_candidates", groups * group, group, frame, views.views(), views.view_lanes(),
                 static_cast<cl_int>(count), views.depths(), camera.layer_depth()(), seen.slots(), seen.tables(), seen.brick_words(),
-                taken.slots(), taken.tables(), taken.brick_words(), tile_views_(), tile_seen_(), candidates.bits()());
+                taken.slots(), taken.tables(), taken.brick_words(), tile_views_(), tile_seen_(), candidates.visit_counts()(),
+                candidates.bits()());
 }
 
 }  // namespace frontier_surfels

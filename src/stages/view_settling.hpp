@@ -11,7 +11,8 @@ class ViewSettling {
   explicit ViewSettling(Commands& commands) : commands_(commands), tile_views_(commands), tile_seen_(commands) {}
 
   /// Clears the candidates whose centre a kept view has seen, or an earlier one by the points that are remembered of it. Those at points
-  /// that were taken back stay. @param taken  TakingBack::taken()
+  /// that were taken back stay. Clears all that it looks at if surfels must be split, because they
+  /// are then found again. @param taken  TakingBack::taken()
   void settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
               Candidates& candidates);
 

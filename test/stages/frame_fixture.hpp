@@ -61,6 +61,23 @@ class FrameFixture {
     map_.commit(frame);
     return map_.changes(frame - 1);
   }
+
+  /// Makes lists until all entries have room. @param make  makes them. @return number of times that this took
+  template <typename Make>
+  int list_all(Make make, const std::vector<DeviceList*>& lists) {
+    for (int times = 1;; ++times) {
+      make();
+      for (DeviceList* list : lists) list->read_length_later();
+      commands_.wait();
+      bool whole = true;
+      for (DeviceList* list : lists) {
+        whole = list->is_whole() && whole;
+        list->note_length();
+      }
+      if (whole) return times;
+    }
+  }
+
   RecentViews& views() { return views_; }
   MapAccess& access() { return access_; }
   const MapAccess& access() const { return access_; }

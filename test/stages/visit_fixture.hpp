@@ -25,10 +25,11 @@ struct VisitFixture : FrameFixture {
   }
 
   /// @param with  observed space; the ends of columns always come from the image
-  void find_candidates(const BitField& with) { candidates.find(frame(), with, visit.counters()); }
+  void find_candidates(const BitField& with) { candidates.find(frame(), with); }
 
   SurfelVisit::Found look(const BitField& with) {
-    return visit.visit(frame(), camera(), with, space.column_end(), views(), taken(), map(), candidates);
+    visit.visit(frame(), camera(), with, space.column_end(), views(), taken(), map(), candidates);
+    return SurfelVisit::read_found(candidates, map());
   }
   SurfelVisit::Found look() { return look(space.bits()); }
 
