@@ -114,6 +114,32 @@ void expect_same(const ViewValue& a, const ViewValue& b) {
   EXPECT_EQ(a.state, b.state);
 }
 
+/// Merged surfels are kept from question to question. They are those of the map as it is now: whatever was asked before, when and how
+/// finely.
+TEST(MapperViews, DoNotDependOnEarlierQuestions) {
+  for (const int lanes : {16, 1}) {
+    Config config = as_recorded();
+    config.lanes = lanes;
+    Mapper asked(config);
+    const auto frames = orbit_frames(coarse_camera(), 15, 13);
+    const auto expect_same_values = [&](unsigned seed, const Intrinsics& camera) {
+      const ViewQuestion question = random_question(9, seed, camera);
+      Mapper other(config);  // has never been asked
+      other.load(asked.saved_map());
+      const std::vector<ViewValue> values = asked.evaluate_views(question), expected = other.evaluate_views(question);
+      for (std::size_t n = 0; n < values.size(); ++n) expect_same(values[n], expected[n]);
+    };
+    for (std::size_t n = 0; n < frames.size(); ++n) {
+      asked.integrate(frames[n].view());
+      asked.evaluate_views(random_question(9, static_cast<unsigned>(n), plain_camera(61, 47, n % 2 == 0 ? 30 : 120)));
+      if (n % 4 == 3) expect_same_values(50 + static_cast<unsigned>(n), plain_camera(61, 47, 60));
+    }
+    asked.reset();
+    for (std::size_t n = 0; n < 5; ++n) asked.integrate(frames[frames.size() - 1 - n].view());
+    expect_same_values(80, plain_camera(40, 30, 33));
+  }
+}
+
 TEST(MapperViews, DoNotDependOnWidthThreadsAndOtherViews) {
   std::vector<std::vector<ViewValue>> all;
   const ViewQuestion question = random_question(9, 3, plain_camera(61, 47, 60));

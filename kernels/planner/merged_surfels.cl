@@ -5,13 +5,14 @@
 // the mean position and normal, and a radius that reaches beyond the outermost centres of its surfels by half the largest radius among
 // them: surfels overlap, and with the whole radius what is merged would be too large in views. All is summed in whole numbers, so that the
 // order of the surfels does not matter.
-//   merged[MERGE_LEVELS][slots of all pages]: surfels as in the map; those of block n begin at PAGE_SLOTS page_begin[n] of their level
-//   merged_count[MERGE_LEVELS][blocks]: how many there are
+//   places[blocks]: what is merged of a block stays for later questions, in a place for as many pages as the block has
+//   merged[places][MERGE_LEVELS][slots of the block's pages]: surfels as in the map
+//   merged_count[places][MERGE_LEVELS]: how many there are, for the first page of each place
 
-INLINE ulong merged_begin(uint level, uint block, __global const uint* page_begin, uint blocks) {
-  return PAGE_SLOTS * ((ulong)(level - 1) * page_begin[blocks] + page_begin[block]);
+INLINE ulong merged_begin(uint level, uint block, __global const uint* page_begin, __global const uint* places) {
+  return PAGE_SLOTS * (MERGE_LEVELS * (ulong)places[block] + (level - 1) * (page_begin[block + 1] - page_begin[block]));
 }
-INLINE uint merged_counter(uint level, uint block, uint blocks) { return (level - 1) * blocks + block; }
+INLINE ulong merged_counter(uint level, uint block, __global const uint* places) { return MERGE_LEVELS * (ulong)places[block] + level - 1; }
 
 // No more surfels of a cell are added up: larger sums would not fit.
 #define MERGE_MOST 32767
@@ -165,13 +166,12 @@ INLINE void write_merged(const MergeCells* cells, float block_size, __global uin
 
 // One work item merges the surfels of every `workers`-th of the listed blocks. The first level is always made, and each level of the one
 // before it, so that the surfels of a level do not depend on which others are asked for.
-//   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  list[count]: number of a block << MERGE_LEVELS, and a
-//   bit
-//       for each level that is asked for, bit 0 for level 1
+//   in  pages: of all blocks, one block after the other;  page_begin[blocks + 1];  places[blocks];  list[count]: number of a block <<
+//       MERGE_LEVELS, and a bit for each level that is asked for, bit 0 for level 1
 //   sums[workers][most_sums] and table[workers][cells of a block]: scratch; all of table is 0 before and afterwards
 //   out merged, merged_count
 __kernel void merge_surfels(const float block_size, __global const uint4* surfels, __global const ulong* alive, __global const uint* pages,
-                            __global const uint* page_begin, const uint blocks, __global const uint* list, const uint count,
+                            __global const uint* page_begin, __global const uint* places, __global const uint* list, const uint count,
                             const uint workers, __global uint* sums, const uint most_sums, __global uint* table, __global uint4* merged,
                             __global uint* merged_count) {
   const uint worker = get_global_id(0);
@@ -193,8 +193,8 @@ __kernel void merge_surfels(const float block_size, __global const uint4* surfel
     for (uint level = 1, asked = list[n] % (1u << MERGE_LEVELS); asked != 0; ++level, asked >>= 1) {
       if (level > 1) merge_next_level(&cells, level, block_size);
       if ((asked & 1) == 0) continue;
-      write_merged(&cells, block_size, merged + merged_begin(level, block, page_begin, blocks));
-      merged_count[merged_counter(level, block, blocks)] = cells.count;
+      write_merged(&cells, block_size, merged + merged_begin(level, block, page_begin, places));
+      merged_count[merged_counter(level, block, places)] = cells.count;
     }
     clear_merge_table(&cells);
   }

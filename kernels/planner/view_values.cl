@@ -4,13 +4,13 @@
 
 // `per_view` work items share an image: each draws the surfels of some of the blocks that the view may see.
 //   in  views[count];  drawn: for each view, nearest first: number of the block * (MERGE_LEVELS + 1), + the level of its merged surfels if
-//       those are drawn;  pages, page_begin[blocks + 1], merged, merged_count: see merged_surfels.cl
+//       those are drawn;  pages, page_begin, places, merged, merged_count: see merged_surfels.cl
 //   i/o images: VIEW_NOTHING before;  tiles[views][image_tiles]: the same, if one work item draws an image; see view_hiding.cl
 __kernel void draw_views(const AskedCamera camera, const float block_size, const float largest_radius, __global const AskedView* views,
-                         const int count, const int per_view, __global const uint* drawn, const uint blocks, __global const uint4* surfels,
+                         const int count, const int per_view, __global const uint* drawn, __global const uint4* surfels,
                          __global const ulong* alive, __global const int4* page_block, __global const uint* pages,
-                         __global const uint* page_begin, __global const uint4* merged, __global const uint* merged_count,
-                         __global uint* images, const uint image_tiles, __global uint* tiles) {
+                         __global const uint* page_begin, __global const uint* places, __global const uint4* merged,
+                         __global const uint* merged_count, __global uint* images, const uint image_tiles, __global uint* tiles) {
   const int n = get_global_id(0) / per_view;
   if (n >= count) return;
   const AskedView view = views[n];
@@ -35,8 +35,8 @@ __kernel void draw_views(const AskedCamera camera, const float block_size, const
       ++since_tiles;
     }
     if (level != 0) {
-      const uint left = merged_count[merged_counter(level, block, blocks)];
-      __global const uint4* own = merged + merged_begin(level, block, page_begin, blocks);
+      const uint left = merged_count[merged_counter(level, block, places)];
+      __global const uint4* own = merged + merged_begin(level, block, page_begin, places);
       for (uint m = 0; m < left; m += LANES) {
         const Surfels s = load_surfels(&window, own, corner, m);
         draw_surfels(&camera, &view.T_camera_local, s, lane_bits(MARK((int)m + lane_numbers() < (int)left)), image, shared);

@@ -126,6 +126,7 @@ class SurfelMap {
 
   const BlockIndex& index() const { return index_; }
   std::vector<BlockKey> blocks_changed_since(std::uint32_t frame) const;  ///< sorted
+  std::vector<std::uint32_t> changed_pages() const;                       ///< of each page: the last frame that has changed it
   std::vector<StoredBlock> read_blocks(const std::vector<BlockKey>& blocks) const;
   void add_block(const BlockKey& block, const std::vector<std::uint8_t>& bytes, std::uint32_t frame);
   void drop_block(const BlockKey& block, std::uint32_t frame);

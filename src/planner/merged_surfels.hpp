@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "map/surfel_map.hpp"
@@ -9,6 +11,7 @@
 
 namespace frontier_surfels {
 
+/// What has been merged is kept as long as its block does not change: between two questions most of the map stays as it is.
 class MergedSurfels {
  public:
   explicit MergedSurfels(Commands& commands);
@@ -19,17 +22,35 @@ class MergedSurfels {
   void merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
              const std::vector<cl_uint>& levels);
 
+  /// Keeps nothing: the next frame may change blocks under a number that one of them already has.
+  void forget();
+
   /// @name Results, for kernels.
   /// @{
   const cl::Buffer& pages() const { return pages_(); }
   const cl::Buffer& page_begin() const { return page_begin_(); }
+  const cl::Buffer& places() const { return places_(); }
   const cl::Buffer& surfels() const { return merged_(); }
   const cl::Buffer& counts() const { return counts_(); }
   /// @}
 
  private:
+  /// What is merged of a block.
+  struct Kept {
+    BlockIndex::Pages pages;    ///< that the block had
+    std::uint32_t changed = 0;  ///< frame that had changed them last
+    cl_uint levels = 0;         ///< bit 0 for level 1
+    cl_uint place = 0;
+  };
+
+  Kept& keep(const BlockIndex::Pages& pages, std::uint32_t changed);
+  std::vector<cl_uint> plan(const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages, const std::vector<cl_uint>& levels);
+  void merge_listed(const char* stage, const SurfelMap& map, std::size_t most_pages, std::vector<cl_uint> list);
+
   Commands& commands_;
-  SentArray<cl_uint> pages_, page_begin_, list_;
+  std::unordered_map<std::uint32_t, Kept> kept_;  ///< by the block's first page
+  cl_uint end_ = 0;                               ///< of the places
+  SentArray<cl_uint> pages_, page_begin_, places_, list_;
   DeviceArray<cl_uint> sums_, table_, counts_;
   DeviceArray<cl_uint4> merged_;
 };

@@ -220,7 +220,6 @@ std::size_t ViewValues::items_per_view(std::size_t views) const {
 void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map,
                            std::vector<ViewValue>& values) {
   Plan plan(question, begin, end, map);
-  const auto blocks = static_cast<cl_uint>(plan.pages.size());
   const AskedCamera camera = asked_camera(question);
   const std::size_t count = end - begin, rows = count * camera.height;
   merged_.merge(kStage, map, plan.pages, plan.levels);
@@ -236,8 +235,8 @@ void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std:
     blocks_.send(std::move(plan.blocks));
     commands_.run(kStage, "draw_views", count * per_view, commands_.shape().heavy_group, camera, static_cast<cl_float>(map.block_size()),
                   static_cast<cl_float>(map.largest_radius()), views_(), static_cast<cl_int>(count), static_cast<cl_int>(per_view),
-                  blocks_(), blocks, map.surfels(), map.alive(), map.page_block(), merged_.pages(), merged_.page_begin(), merged_.surfels(),
-                  merged_.counts(), images_(), static_cast<cl_uint>(image_tiles), tiles_());
+                  blocks_(), map.surfels(), map.alive(), map.page_block(), merged_.pages(), merged_.page_begin(), merged_.places(),
+                  merged_.surfels(), merged_.counts(), images_(), static_cast<cl_uint>(image_tiles), tiles_());
   }
   areas_.resize(2 * rows);
   counts_.resize(VIEW_COUNTS * rows);

@@ -22,6 +22,8 @@ class ViewValues {
   /// Areas and pixels of each view; `state` and `clearance` are left as they are. The question must have been checked.
   std::vector<ViewValue> find(const ViewQuestion& question, const SurfelMap& map);
 
+  void forget_merged() { merged_.forget(); }  ///< to be called when a frame has failed
+
  private:
   struct Plan;
   void find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map, std::vector<ViewValue>& values);
