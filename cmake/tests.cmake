@@ -68,7 +68,8 @@ foreach(source ${TEST_SOURCES})
   target_precompile_headers(${target} REUSE_FROM frontier_surfels_test_headers)
   add_test(NAME ${name} COMMAND ${target})
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE}" TIMEOUT 600)
-  if(name MATCHES "^test_(stage_|surfel_packing)")  # kernels are tested at both widths
+  # Kernels are tested at both widths, and so is what the host does in another way for graphics processors.
+  if(name MATCHES "^test_(stage_|surfel_packing|mapper_(changes|ids|splits)$)")
     add_test(NAME ${name}_lanes_1 COMMAND ${target})
     set_tests_properties(${name}_lanes_1 PROPERTIES
       ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE};FRONTIER_SURFELS_TEST_LANES=1" TIMEOUT 600)

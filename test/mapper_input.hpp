@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -21,10 +22,12 @@ namespace frontier_surfels {
 
 using Frames = std::vector<replay::RecordedFrame>;
 
-/// The default configuration for images that already have the working resolution. Rendering fewer pixels makes these tests quick.
+/// The default configuration for images that already have the working resolution. Rendering fewer pixels makes these tests quick. The lanes
+/// are those of FRONTIER_SURFELS_TEST_LANES (16 or 1): at 1 a CPU is used as graphics processors are.
 inline Config undecimated() {
   Config config;
   config.decimation = 1;
+  if (const char* lanes = std::getenv("FRONTIER_SURFELS_TEST_LANES")) config.lanes = std::atoi(lanes);
   return config;
 }
 

@@ -62,12 +62,11 @@ class Simulation {
         if (random_() % 3 == 0) {
           pages.push_back(page);
           words.push_back(random_() % 4 == 0 ? 0 : Word{1} << random_() % 64);
+          if (words.back() != 0) alive_[page] = (Word{random_()} << 32 | random_()) & (Word{random_()} << 32 | random_());
         }
       log.note(static_cast<std::uint32_t>(now_), pages, words);
       slow_.note(static_cast<std::uint32_t>(now_), pages, words);
     }
-    alive_.assign(6, 0);
-    for (Word& word : alive_) word = (Word{random_()} << 32 | random_()) & (Word{random_()} << 32 | random_());
   }
 
   void ask(std::size_t reader) {
@@ -79,13 +78,15 @@ class Simulation {
       ++asked;
       // Of what has changed, the reader must be told of the end of what it knows.
       std::map<std::size_t, Word> ends;
-      for (const auto& [page, word] : expected) ends[page] = word & known_[reader][page];
+      for (const auto& [page, word] : expected)
+        if ((word & known_[reader][page]) != 0) ends[page] = word & known_[reader][page];
       EXPECT_TRUE(contains(by_page(difference.known), ends));
     }
     readers_[reader] = now_;
     known_[reader] = alive_;
     std::set<std::uint64_t> maps(readers_.begin(), readers_.end());
     maps.erase(0);
+    check_alive();
     log.divide({maps.begin(), maps.end()}, now_, alive_);
     const auto known = by_page(log.known(alive_.size()));
     for (std::size_t n = 0; n < readers_.size(); ++n) {
@@ -109,6 +110,15 @@ class Simulation {
   int asked = 0, exact = 0;
 
  private:
+  /// What was alive before and the pages that have changed since are enough to know what is alive.
+  void check_alive() const {
+    std::optional<Words> alive = log.alive_before();
+    if (!alive) return;
+    alive->resize(alive_.size(), 0);
+    for (const std::uint32_t page : log.changed_pages(alive_.size())) (*alive)[page] = alive_[page];
+    EXPECT_EQ(*alive, alive_);
+  }
+
   void ask_first(std::size_t reader) {
     frame();
     ask(reader);
@@ -118,7 +128,7 @@ class Simulation {
   std::vector<Words> known_;            ///< the slots of that map
   std::mt19937 random_;
   SlowLog slow_;
-  Words alive_;
+  Words alive_ = Words(6, 0);
   std::uint64_t now_ = 0;
 };
 

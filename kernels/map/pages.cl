@@ -228,6 +228,16 @@ __kernel void finish_pages(__global const uint* pages, const uint count, __globa
   changed[page] = 0;
 }
 
+// One work item handles a page of a list: it copies its words for the host.
+//   in  pages[count], alive, page_block;   out page_alive[count], blocks[count]
+__kernel void gather_page_words(__global const uint* pages, const uint count, __global const ulong* alive, __global const int4* page_block,
+                                __global ulong* page_alive, __global int4* blocks) {
+  const uint n = get_global_id(0);
+  if (n >= count) return;
+  page_alive[n] = alive[pages[n]];
+  blocks[n] = page_block[pages[n]];
+}
+
 // One work item handles a slot of a list: it copies its surfel for the host.
 //   in  slots[count];   out gathered[count]
 __kernel void gather_surfels(__global const uint* slots, const uint count, __global const uint4* surfels, __global uint4* gathered) {

@@ -20,7 +20,10 @@ void add(const Words& from, Words& to) {
 }  // namespace
 
 ChangeLog::Set& ChangeLog::open(std::uint32_t frame) {
-  if (sets_.empty()) sets_.emplace_back();
+  if (sets_.empty()) {
+    sets_.emplace_back();
+    has_alive_ = false;
+  }
   divided_ = false;
   if (frame != frame_) frames_own_.clear();
   frame_ = frame;
@@ -58,7 +61,20 @@ void ChangeLog::divide(const std::vector<std::uint64_t>& readers, std::uint64_t 
     merge(1);
   }
   sets_.push_back({now, now, {}, std::move(alive)});
-  divided_ = true;
+  divided_ = has_alive_ = true;
+}
+
+std::optional<Words> ChangeLog::alive_before() const {
+  if (sets_.empty() || !has_alive_) return std::nullopt;
+  return sets_.back().alive;
+}
+
+std::vector<std::uint32_t> ChangeLog::changed_pages(std::size_t pages) const {
+  std::vector<std::uint32_t> changed;
+  const Words& words = sets_.back().changed;
+  for (std::uint32_t page = 0; page < std::min(words.size(), pages); ++page)
+    if (words[page] != 0) changed.push_back(page);
+  return changed;
 }
 
 /// Adds the n-th set to the one before.

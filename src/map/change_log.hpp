@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,14 @@ class ChangeLog {
   /// A reader has been told of the map as it is now. What no reader asks for any more is forgotten.
   /// @param readers  the maps that readers have, ascending; at least one. @param now  number of this map. @param alive  its slots
   void divide(const std::vector<std::uint64_t>& readers, std::uint64_t now, Words alive);
+
+  /// @name For divide(), if the whole of `alive` is not at hand
+  /// @{
+  /// `alive` as the last divide() got it; null if there was none
+  std::optional<Words> alive_before() const;
+  /// The pages 0, 1, ... `pages` - 1 that have changed since then.
+  std::vector<std::uint32_t> changed_pages(std::size_t pages) const;
+  /// @}
 
   void clear() { *this = {}; }
 
@@ -57,6 +66,7 @@ class ChangeLog {
 
   std::deque<Set> sets_;
   bool divided_ = false;                                    ///< the last set is for frames that come
+  bool has_alive_ = false;                                  ///< divide() has made the last set
   std::uint64_t frame_ = 0;                                 ///< the last one
   std::vector<std::pair<std::uint32_t, Word>> frames_own_;  ///< what it has changed: pages with their words
 };

@@ -12,10 +12,9 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kGathered = 1 << 14;         // pages that are copied to the host at a time
-constexpr std::size_t kGatheredSurfels = 1 << 15;  // surfels that are copied to the host at a time: few enough for the cache
-constexpr std::size_t kSpare = 16;                 // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
-                                                   // costs nothing there until it is touched
+constexpr std::size_t kGathered = 1 << 14;  // pages that are copied to the host at a time
+constexpr std::size_t kSpare = 16;          // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
+                                            // costs nothing there until it is touched
 
 BlockKey key_of(const cl_int4& block) { return {block.s[0], block.s[1], block.s[2]}; }
 
@@ -278,74 +277,6 @@ std::vector<Surfel> SurfelMap::download() const {
     for_each_bit(alive, [&](std::uint32_t n) { surfels.push_back(to_surfel(packed[n], block, PAGE_SLOTS * page + n)); });
   });
   return surfels;
-}
-
-Changes SurfelMap::changes(std::uint64_t since) const { return changes(log_.since(since)); }
-
-Changes SurfelMap::whole() const {
-  const ChangeLog::Words all(index_.end(), ~ChangeLog::Word{0});
-  return changes({all, all});
-}
-
-Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
-  const auto alive = alive_.read(index_.end());
-  const auto blocks = page_block_.read(index_.end());
-  Changes changes;
-  std::vector<cl_uint> slots;
-  const std::size_t pages = std::min(difference.changed.size(), alive.size());
-  std::size_t updated = 0;
-  for (Page page = 0; page < pages; ++page)
-    updated += static_cast<std::size_t>(__builtin_popcountll(difference.changed[page] & alive[page]));
-  slots.reserve(updated);
-  for (Page page = 0; page < pages; ++page) {
-    const ChangeLog::Word changed = difference.changed[page], known = page < difference.known.size() ? difference.known[page] : 0;
-    for_each_bit(changed & alive[page], [&](std::uint32_t n) { slots.push_back(PAGE_SLOTS * page + n); });
-    for_each_bit(changed & known & ~alive[page], [&](std::uint32_t n) { changes.removed.push_back(PAGE_SLOTS * page + n); });
-  }
-  changes.updated.reserve(slots.size());
-  if (commands_.device().is_cpu && !slots.empty()) {  // its memory is the host's, who reads the surfels where they are
-    const std::size_t bytes = PAGE_SLOTS * index_.end() * sizeof(cl_uint4);
-    FaultInjection::waits();
-    void* surfels = commands_.queue(Call::kRead).enqueueMapBuffer(surfels_(), CL_TRUE, CL_MAP_READ, 0, bytes);
-    unpack_slots(static_cast<const cl_uint4*>(surfels), slots, blocks, block_size_, changes.updated);
-    commands_.queue().enqueueUnmapMemObject(surfels_(), surfels);
-    return changes;
-  }
-  DeviceArray<cl_uint> list(commands_);
-  DeviceArray<cl_uint4> gathered(commands_);
-  list.allocate(std::min(slots.size(), kGatheredSurfels));
-  gathered.allocate(std::min(slots.size(), kGatheredSurfels));
-  for (std::size_t begin = 0; begin < slots.size(); begin += kGatheredSurfels) {
-    const std::vector<cl_uint> some(slots.begin() + begin, slots.begin() + std::min(begin + kGatheredSurfels, slots.size()));
-    list.write(some);
-    commands_.run("changes", "gather_surfels", some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(), gathered());
-    unpack_gathered(gathered.read(some.size()), some, blocks, block_size_, changes.updated);
-  }
-  return changes;
-}
-
-void SurfelMap::log_changes(const std::vector<std::uint64_t>& readers, std::uint64_t now) {
-  logs_changes_ = !readers.empty();
-  if (logs_changes_)
-    log_.divide(readers, now, alive_.read(index_.end()));
-  else
-    log_.clear();
-}
-
-void SurfelMap::reserve_ids(const std::vector<std::uint64_t>& readers, std::uint64_t now) {
-  log_changes(readers, now);
-  if (readers.empty()) {
-    reserves_ids_ = false;
-    index_.release(~std::uint64_t{0});
-    return;
-  }
-  if (!reserves_ids_) {
-    reserved_.allocate(alive_.size());
-    reserved_.fill("changes", 0, alive_.size());
-  }
-  reserved_.write(log_.known(index_.end()));
-  reserves_ids_ = true;
-  index_.release(readers.front());
 }
 
 std::size_t SurfelMap::allocated_bytes() const {

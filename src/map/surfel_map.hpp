@@ -16,6 +16,7 @@
 #include "map/block_key.hpp"
 #include "map/change_log.hpp"
 #include "map/map_window.hpp"
+#include "map/surfel_packing.hpp"
 #include "opencl/commands.hpp"
 #include "opencl/lists.hpp"
 
@@ -155,6 +156,8 @@ class SurfelMap {
 
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
   Changes changes(const ChangeLog::Difference& difference) const;
+  ListedPages list_pages(std::vector<Page> pages) const;
+  void read_surfels(const ListedPages& pages, const std::vector<cl_uint>& entries, std::vector<Surfel>& to) const;
   void begin_undo();
   void restore();
   Page add_page(const BlockKey& block);

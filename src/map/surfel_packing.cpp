@@ -54,11 +54,10 @@ inline Surfel unpack_inline(const cl_uint4& packed, const BlockKey& block, doubl
   return surfel;
 }
 
-inline void unpack_slot(const cl_uint4& packed, cl_uint slot, const std::vector<cl_int4>& page_block, double block_size,
-                        std::vector<Surfel>& to) {
-  const auto& block = page_block[slot / PAGE_SLOTS].s;
+inline void unpack_entry(const cl_uint4& packed, const ListedPages& pages, cl_uint entry, double block_size, std::vector<Surfel>& to) {
+  const auto& block = pages.blocks[entry / PAGE_SLOTS].s;
   to.push_back(unpack_inline(packed, {block[0], block[1], block[2]}, block_size));
-  to.back().id = slot;
+  to.back().id = pages.slot(entry);
 }
 
 }  // namespace
@@ -80,14 +79,14 @@ cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size) {
 
 Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size) { return unpack_inline(packed, block, block_size); }
 
-void unpack_gathered(const std::vector<cl_uint4>& packed, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block,
-                     double block_size, std::vector<Surfel>& to) {
-  for (std::size_t n = 0; n < slots.size(); ++n) unpack_slot(packed[n], slots[n], page_block, block_size, to);
+void unpack_gathered(const std::vector<cl_uint4>& packed, const ListedPages& pages, const cl_uint* entries, double block_size,
+                     std::vector<Surfel>& to) {
+  for (std::size_t n = 0; n < packed.size(); ++n) unpack_entry(packed[n], pages, entries[n], block_size, to);
 }
 
-void unpack_slots(const cl_uint4* surfels, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block, double block_size,
-                  std::vector<Surfel>& to) {
-  for (const cl_uint slot : slots) unpack_slot(surfels[slot], slot, page_block, block_size, to);
+void unpack_entries(const cl_uint4* surfels, const ListedPages& pages, const std::vector<cl_uint>& entries, double block_size,
+                    std::vector<Surfel>& to) {
+  for (const cl_uint entry : entries) unpack_entry(surfels[pages.slot(entry)], pages, entry, block_size, to);
 }
 
 std::vector<cl_uint4> to_surfels(const std::vector<std::uint8_t>& bytes) {

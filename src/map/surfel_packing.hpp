@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "common/shared.h"
 #include "frontier_surfels/types.hpp"
 #include "map/block_key.hpp"
 #include "opencl/opencl.hpp"
@@ -18,10 +19,22 @@ Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size);
 
 /// Append the surfels of slots, with their ids. @param packed  one for each slot. @param surfels  of all slots of the map.
 /// @param page_block  (x, y, z) of the blocks of all pages
-void unpack_gathered(const std::vector<cl_uint4>& packed, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block,
-                     double block_size, std::vector<Surfel>& to);
-void unpack_slots(const cl_uint4* surfels, const std::vector<cl_uint>& slots, const std::vector<cl_int4>& page_block, double block_size,
-                  std::vector<Surfel>& to);
+
+/// Some pages of the map, ascending. A surfel of them is named by its entry: PAGE_SLOTS times the place of its page in `pages`, + its slot
+/// there.
+struct ListedPages {
+  std::vector<std::uint32_t> pages;
+  std::vector<cl_ulong> alive;  ///< of each page: its word
+  std::vector<cl_int4> blocks;  ///< of each page: its block, and the frame that has changed it last
+
+  cl_uint slot(cl_uint entry) const { return PAGE_SLOTS * pages[entry / PAGE_SLOTS] + entry % PAGE_SLOTS; }
+};
+
+/// @param packed  the surfels of these entries;  surfels: all surfels of the map, by slot
+void unpack_gathered(const std::vector<cl_uint4>& packed, const ListedPages& pages, const cl_uint* entries, double block_size,
+                     std::vector<Surfel>& to);
+void unpack_entries(const cl_uint4* surfels, const ListedPages& pages, const std::vector<cl_uint>& entries, double block_size,
+                    std::vector<Surfel>& to);
 
 /// Surfels of a block from bytes, 16 for each. @throws FileError  the number of bytes is no multiple of 16
 std::vector<Surfel> unpack_block(const std::vector<std::uint8_t>& bytes, const BlockKey& block, double block_size);
