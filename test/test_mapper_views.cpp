@@ -1,4 +1,5 @@
 /// What views see of the map, against the slow obvious answer: every ray against every disc.
+#include "opencl/fault_injection.hpp"
 #include "planner_input.hpp"
 
 namespace frontier_surfels {
@@ -138,6 +139,42 @@ TEST(MapperViews, DoNotDependOnEarlierQuestions) {
     for (std::size_t n = 0; n < 5; ++n) asked.integrate(frames[frames.size() - 1 - n].view());
     expect_same_values(80, plain_camera(40, 30, 33));
   }
+}
+
+/// Nor on frames and questions that have failed in between: what was merged for an answer that never came, or of a frame that was undone,
+/// is not used.
+TEST(MapperViews, DoNotDependOnFailures) {
+  struct EndOfFaults {
+    ~EndOfFaults() { FaultInjection::stop(); }
+  } end_of_faults;
+  const auto frames = orbit_frames(coarse_camera(), 15, 13);
+  const ViewQuestion question = random_question(9, 4, plain_camera(61, 47, 40));
+  Mapper mapper(as_recorded());
+  std::size_t failed_frames = 0, failed_questions = 0;
+  for (std::size_t n = 0; n < 24; ++n) {
+    const auto frame = frames[n % frames.size()].view();
+    const auto fails = [&](std::size_t passing, const auto& call) {
+      FaultInjection::fail(passing, 1);
+      try {
+        call();
+      } catch (const DeviceError&) {
+        FaultInjection::stop();
+        return true;
+      }
+      FaultInjection::stop();
+      return false;
+    };
+    failed_frames += fails(3 * n, [&] { mapper.integrate(frame); }) ? 1 : 0;
+    failed_questions += fails(n, [&] { mapper.evaluate_views(question); }) ? 1 : 0;
+    mapper.evaluate_views(question);
+    mapper.integrate(frame);
+    Mapper other(as_recorded());
+    other.load(mapper.saved_map());
+    const std::vector<ViewValue> values = mapper.evaluate_views(question), expected = other.evaluate_views(question);
+    for (std::size_t view = 0; view < values.size(); ++view) expect_same(values[view], expected[view]);
+  }
+  EXPECT_GT(failed_frames, 10u);
+  EXPECT_GT(failed_questions, 10u);
 }
 
 TEST(MapperViews, DoNotDependOnWidthThreadsAndOtherViews) {

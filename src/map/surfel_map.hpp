@@ -127,7 +127,7 @@ class SurfelMap {
 
   const BlockIndex& index() const { return index_; }
   std::vector<BlockKey> blocks_changed_since(std::uint32_t frame) const;  ///< sorted
-  std::vector<std::uint32_t> changed_pages() const;                       ///< of each page: the last frame that has changed it
+  ListedPages list_pages(std::vector<std::uint32_t> pages) const;         ///< in the order given
   std::vector<StoredBlock> read_blocks(const std::vector<BlockKey>& blocks) const;
   void add_block(const BlockKey& block, const std::vector<std::uint8_t>& bytes, std::uint32_t frame);
   void drop_block(const BlockKey& block, std::uint32_t frame);
@@ -156,7 +156,6 @@ class SurfelMap {
 
   void visit(const std::vector<Page>& pages, const PageVisitor& visitor) const;
   Changes changes(const ChangeLog::Difference& difference) const;
-  ListedPages list_pages(std::vector<Page> pages) const;
   void read_surfels(const ListedPages& pages, const std::vector<cl_uint>& entries, std::vector<Surfel>& to) const;
   void begin_undo();
   void restore();

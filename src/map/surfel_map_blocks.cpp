@@ -78,18 +78,11 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   return slots;
 }
 
-std::vector<std::uint32_t> SurfelMap::changed_pages() const {
-  std::vector<std::uint32_t> frames;
-  frames.reserve(index_.end());
-  for (const cl_int4& block : page_block_.read(index_.end())) frames.push_back(static_cast<std::uint32_t>(block.s[3]));
-  return frames;
-}
-
 std::vector<BlockKey> SurfelMap::blocks_changed_since(std::uint32_t frame) const {
-  const std::vector<std::uint32_t> changed_pages = this->changed_pages();
+  const auto blocks = page_block_.read(index_.end());
   std::vector<BlockKey> changed;
   for (const auto& [block, pages] : index_.blocks()) {
-    const auto is_newer = [&](Page page) { return changed_pages[page] > frame; };
+    const auto is_newer = [&](Page page) { return static_cast<std::uint32_t>(blocks[page].s[3]) > frame; };
     if (std::any_of(pages.begin(), pages.end(), is_newer)) changed.push_back(block);
   }
   std::sort(changed.begin(), changed.end());

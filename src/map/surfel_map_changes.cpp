@@ -22,7 +22,7 @@ Changes SurfelMap::whole() const {
   return changes({all, all});
 }
 
-/// What is asked of the device is as much as has changed, not as much as the map has.
+/// A device with memory of its own is asked for these pages alone.
 ListedPages SurfelMap::list_pages(std::vector<Page> pages) const {
   ListedPages listed = {std::move(pages), {}, {}};
   const std::size_t count = listed.pages.size();

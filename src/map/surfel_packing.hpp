@@ -17,10 +17,7 @@ cl_uint4 pack(const Surfel& surfel, const BlockKey& block, double block_size);
 
 Surfel unpack(const cl_uint4& packed, const BlockKey& block, double block_size);
 
-/// Append the surfels of slots, with their ids. @param packed  one for each slot. @param surfels  of all slots of the map.
-/// @param page_block  (x, y, z) of the blocks of all pages
-
-/// Some pages of the map, ascending. A surfel of them is named by its entry: PAGE_SLOTS times the place of its page in `pages`, + its slot
+/// Some pages of the map. A surfel of them is named by its entry: PAGE_SLOTS times the place of its page in `pages`, + its slot
 /// there.
 struct ListedPages {
   std::vector<std::uint32_t> pages;
@@ -30,7 +27,7 @@ struct ListedPages {
   cl_uint slot(cl_uint entry) const { return PAGE_SLOTS * pages[entry / PAGE_SLOTS] + entry % PAGE_SLOTS; }
 };
 
-/// @param packed  the surfels of these entries;  surfels: all surfels of the map, by slot
+/// Append the surfels of entries, with their ids. @param packed  one for each entry;  surfels: those of all slots of the map
 void unpack_gathered(const std::vector<cl_uint4>& packed, const ListedPages& pages, const cl_uint* entries, double block_size,
                      std::vector<Surfel>& to);
 void unpack_entries(const cl_uint4* surfels, const ListedPages& pages, const std::vector<cl_uint>& entries, double block_size,

@@ -133,7 +133,7 @@ std::vector<ViewValue> Mapper::Impl::evaluate_views(const ViewQuestion& question
   const double most = question.most_clearance;
   const std::vector<float> room =
       most > 0 ? clearance_of(found, boundaries.nearest(positions, most, map), most) : std::vector<float>(found.size());
-  std::vector<ViewValue> values = view_values.find(question, map);
+  std::vector<ViewValue> values = view_values.find(question, map, sequence);
   for (std::size_t n = 0; n < values.size(); ++n) {
     values[n].state = found[n];
     values[n].clearance = room[n];

@@ -33,7 +33,6 @@ Report Mapper::Impl::integrate(const DepthFrame& input) {
   } catch (const std::exception&) {
     list.voxels().expect_nothing();  // room for many candidates may have been too much for the device
     creation.chosen().expect_nothing();
-    view_values.forget_merged();
     try {
       map.roll_back();
     } catch (const std::exception&) {  // the next call tries again

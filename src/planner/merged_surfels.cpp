@@ -24,7 +24,7 @@ MergedSurfels::MergedSurfels(Commands& commands)
       merged_(commands) {}
 
 void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
-                          const std::vector<cl_uint>& levels) {
+                          const std::vector<cl_uint>& levels, std::uint64_t now) {
   std::vector<cl_uint> all, begin = {0};
   std::size_t most_pages = 1, merged_pages = 0;
   for (std::size_t block = 0; block < pages.size(); ++block) {
@@ -37,13 +37,15 @@ void MergedSurfels::merge(const char* stage, const SurfelMap& map, const std::ve
   pages_.send(std::move(all));
   page_begin_.send(std::move(begin));
   if (end_ > 2 * merged_pages + PAGE_SLOTS) forget();  // most places are of blocks that have changed, or are not asked for
-  std::vector<cl_uint> list;
-  try {
-    list = plan(map, pages, levels);
-    if (!list.empty()) merge_listed(stage, map, most_pages, std::move(list));
-  } catch (...) {
-    forget();  // what is planned has not been merged
-    throw;
+  for (bool may_forget = end_ > 0;; may_forget = false) {
+    try {
+      std::vector<cl_uint> list = plan(map, pages, levels, now);
+      if (!list.empty()) merge_listed(stage, map, most_pages, std::move(list));
+      return;
+    } catch (...) {
+      forget();  // what is planned has not been merged
+      if (!may_forget) throw;
+    }
   }
 }
 
@@ -54,15 +56,19 @@ void MergedSurfels::forget() {
 
 /// Finds a place for each block whose merged surfels are needed. @return the blocks that must be merged, as merge_surfels takes them
 std::vector<cl_uint> MergedSurfels::plan(const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
-                                         const std::vector<cl_uint>& levels) {
-  const std::vector<std::uint32_t> changed_pages = map.changed_pages();
+                                         const std::vector<cl_uint>& levels, std::uint64_t now) {
+  BlockIndex::Pages asked;
+  for (std::size_t block = 0; block < pages.size(); ++block)
+    if (levels[block] != 0) asked.insert(asked.end(), pages[block]->begin(), pages[block]->end());
+  const ListedPages listed = map.list_pages(std::move(asked));
   const cl_uint before = end_;
   std::vector<cl_uint> places(pages.size(), 0), list;
+  auto next = listed.blocks.begin();
   for (std::size_t block = 0; block < pages.size(); ++block) {
     if (levels[block] == 0) continue;
     std::uint32_t changed = 0;
-    for (const std::uint32_t page : *pages[block]) changed = std::max(changed, changed_pages[page]);
-    Kept& kept = keep(*pages[block], changed);
+    for (std::size_t n = 0; n < pages[block]->size(); ++n, ++next) changed = std::max(changed, static_cast<std::uint32_t>(next->s[3]));
+    Kept& kept = keep(*pages[block], changed, now);
     places[block] = kept.place;
     if ((levels[block] & ~kept.levels) == 0) continue;
     kept.levels |= levels[block];
@@ -77,7 +83,7 @@ std::vector<cl_uint> MergedSurfels::plan(const SurfelMap& map, const std::vector
 }
 
 /// @return what is kept of a block, or a place without levels if that is not up to date
-MergedSurfels::Kept& MergedSurfels::keep(const BlockIndex::Pages& pages, std::uint32_t changed) {
+MergedSurfels::Kept& MergedSurfels::keep(const BlockIndex::Pages& pages, std::uint32_t changed, std::uint64_t now) {
   const auto [found, is_new] = kept_.try_emplace(pages.front());
   Kept& kept = found->second;
   if (!is_new && kept.changed == changed && kept.pages == pages) return kept;
@@ -86,7 +92,7 @@ MergedSurfels::Kept& MergedSurfels::keep(const BlockIndex::Pages& pages, std::ui
     end_ += static_cast<cl_uint>(pages.size());
   }
   kept.pages = pages;
-  kept.changed = changed;
+  kept.changed = changed <= now ? changed : kNeverAgain;
   kept.levels = 0;
   return kept;
 }

@@ -19,10 +19,11 @@ class MergedSurfels {
   /// Merges the surfels of blocks of the map.
   /// @param pages   of each block
   /// @param levels  of each block: those that are needed, bit 0 for level 1
+  /// @param now     number of the map: pages that a failed frame has changed have a later one, which the next frame will use again
   void merge(const char* stage, const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages,
-             const std::vector<cl_uint>& levels);
+             const std::vector<cl_uint>& levels, std::uint64_t now);
 
-  /// Keeps nothing: the next frame may change blocks under a number that one of them already has.
+  /// Keeps nothing. To be called if the device has failed before the answer came.
   void forget();
 
   /// @name Results, for kernels.
@@ -38,13 +39,16 @@ class MergedSurfels {
   /// What is merged of a block.
   struct Kept {
     BlockIndex::Pages pages;    ///< that the block had
-    std::uint32_t changed = 0;  ///< frame that had changed them last
+    std::uint32_t changed = 0;  ///< frame that had changed them last, or kNeverAgain
     cl_uint levels = 0;         ///< bit 0 for level 1
     cl_uint place = 0;
   };
 
-  Kept& keep(const BlockIndex::Pages& pages, std::uint32_t changed);
-  std::vector<cl_uint> plan(const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages, const std::vector<cl_uint>& levels);
+  static constexpr std::uint32_t kNeverAgain = ~std::uint32_t{0};
+
+  Kept& keep(const BlockIndex::Pages& pages, std::uint32_t changed, std::uint64_t now);
+  std::vector<cl_uint> plan(const SurfelMap& map, const std::vector<const BlockIndex::Pages*>& pages, const std::vector<cl_uint>& levels,
+                            std::uint64_t now);
   void merge_listed(const char* stage, const SurfelMap& map, std::size_t most_pages, std::vector<cl_uint> list);
 
   Commands& commands_;

@@ -201,12 +201,17 @@ ViewValues::ViewValues(Commands& commands)
       areas_(commands),
       counts_(commands) {}
 
-std::vector<ViewValue> ViewValues::find(const ViewQuestion& question, const SurfelMap& map) {
+std::vector<ViewValue> ViewValues::find(const ViewQuestion& question, const SurfelMap& map, std::uint64_t now) {
   std::vector<ViewValue> values(question.T_world_camera.size());
   const std::size_t image_bytes = asked_camera(question).image * sizeof(cl_uint);
   const std::size_t at_once = std::clamp(kMostImageBytes / image_bytes, std::size_t{1}, std::size_t{1000});
-  for (std::size_t begin = 0; begin < values.size(); begin += at_once)
-    find_some(question, begin, std::min(begin + at_once, values.size()), map, values);
+  try {
+    for (std::size_t begin = 0; begin < values.size(); begin += at_once)
+      find_some(question, begin, std::min(begin + at_once, values.size()), map, now, values);
+  } catch (...) {
+    merged_.forget();  // it may not have been merged
+    throw;
+  }
   return values;
 }
 
@@ -217,12 +222,12 @@ std::size_t ViewValues::items_per_view(std::size_t views) const {
   return std::clamp(items / views, std::size_t{1}, std::size_t{256});
 }
 
-void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map,
+void ViewValues::find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map, std::uint64_t now,
                            std::vector<ViewValue>& values) {
   Plan plan(question, begin, end, map);
   const AskedCamera camera = asked_camera(question);
   const std::size_t count = end - begin, rows = count * camera.height;
-  merged_.merge(kStage, map, plan.pages, plan.levels);
+  merged_.merge(kStage, map, plan.pages, plan.levels, now);
   views_.send(std::move(plan.views));
   images_.resize(count * camera.image);
   images_.fill(kStage, VIEW_NOTHING, count * camera.image);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "common/shared.h"
@@ -20,13 +21,13 @@ class ViewValues {
   explicit ViewValues(Commands& commands);
 
   /// Areas and pixels of each view; `state` and `clearance` are left as they are. The question must have been checked.
-  std::vector<ViewValue> find(const ViewQuestion& question, const SurfelMap& map);
-
-  void forget_merged() { merged_.forget(); }  ///< to be called when a frame has failed
+  /// @param now  number of the map
+  std::vector<ViewValue> find(const ViewQuestion& question, const SurfelMap& map, std::uint64_t now);
 
  private:
   struct Plan;
-  void find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map, std::vector<ViewValue>& values);
+  void find_some(const ViewQuestion& question, std::size_t begin, std::size_t end, const SurfelMap& map, std::uint64_t now,
+                 std::vector<ViewValue>& values);
   std::size_t items_per_view(std::size_t views) const;
 
   Commands& commands_;
