@@ -131,7 +131,7 @@ TEST(StageLists, SetBitsIntoTheRoomThatThereIs) {
     const bool whole = make();
     EXPECT_EQ(whole, expected.size() <= list.room());
     EXPECT_EQ(list.count(), std::min(list.room(), expected.size()));
-    if (commands.shape().asks_lengths) {
+    if (commands.shape().is_near) {
       EXPECT_EQ(list.room(), expected.size());
     }
     EXPECT_TRUE(list.read() == std::vector<std::uint32_t>(expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(list.count())));
@@ -139,7 +139,7 @@ TEST(StageLists, SetBitsIntoTheRoomThatThereIs) {
     EXPECT_TRUE(make());
     EXPECT_TRUE(list.read() == expected);
   }
-  if (!commands.shape().asks_lengths) {
+  if (!commands.shape().is_near) {
     EXPECT_GT(cut, reference::small_tests() ? 0u : 2u) << "there was always room";
   }
 }

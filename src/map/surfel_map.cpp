@@ -251,8 +251,7 @@ Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::u
 
 /// Copies pages to the host, kGathered at a time, and calls the visitor for each.
 void SurfelMap::visit(const std::vector<Page>& pages, const PageVisitor& visitor) const {
-  const auto alive = alive_.read(index_.end());
-  const auto blocks = page_block_.read(index_.end());
+  const ListedPages listed = list_pages(pages);
   DeviceArray<cl_uint> list(commands_);
   DeviceArray<cl_uint4> gathered(commands_);
   for (std::size_t begin = 0; begin < pages.size(); begin += kGathered) {
@@ -262,7 +261,8 @@ void SurfelMap::visit(const std::vector<Page>& pages, const PageVisitor& visitor
     commands_.run("changes", "gather_pages", PAGE_SLOTS * some.size(), kGroup, list(), static_cast<cl_uint>(some.size()), surfels_(),
                   gathered());
     const auto surfels = gathered.read(PAGE_SLOTS * some.size());
-    for (std::size_t n = 0; n < some.size(); ++n) visitor(some[n], blocks[some[n]], alive[some[n]], &surfels[PAGE_SLOTS * n]);
+    for (std::size_t n = 0; n < some.size(); ++n)
+      visitor(some[n], listed.blocks[begin + n], listed.alive[begin + n], &surfels[PAGE_SLOTS * n]);
   }
 }
 

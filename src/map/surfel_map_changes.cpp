@@ -27,7 +27,7 @@ ListedPages SurfelMap::list_pages(std::vector<Page> pages) const {
   ListedPages listed = {std::move(pages), {}, {}};
   const std::size_t count = listed.pages.size();
   if (count == 0) return listed;
-  if (!commands_.shape().reads_in_place && count < index_.end()) {
+  if (!commands_.shape().is_near && count < index_.end()) {
     DeviceArray<cl_uint> list(commands_);
     DeviceArray<cl_ulong> alive(commands_);
     DeviceArray<cl_int4> blocks(commands_);
@@ -72,7 +72,7 @@ Changes SurfelMap::changes(const ChangeLog::Difference& difference) const {
 }
 
 void SurfelMap::read_surfels(const ListedPages& pages, const std::vector<cl_uint>& entries, std::vector<Surfel>& to) const {
-  if (commands_.shape().reads_in_place) {
+  if (commands_.shape().is_near) {
     const std::size_t bytes = PAGE_SLOTS * index_.end() * sizeof(cl_uint4);
     FaultInjection::waits();
     void* surfels = commands_.queue(Call::kRead).enqueueMapBuffer(surfels_(), CL_TRUE, CL_MAP_READ, 0, bytes);
@@ -97,7 +97,7 @@ void SurfelMap::log_changes(const std::vector<std::uint64_t>& readers, std::uint
   logs_changes_ = !readers.empty();
   if (!logs_changes_) return log_.clear();
   std::optional<ChangeLog::Words> alive = log_.alive_before();
-  if (!alive || commands_.shape().reads_in_place) {
+  if (!alive || commands_.shape().is_near) {
     alive = alive_.read(index_.end());
   } else {  // as it was at the last division, but for what has changed since
     alive->resize(index_.end(), 0);

@@ -54,7 +54,7 @@ std::uint32_t Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& b
 
 void Lists::list_bits(const char* stage, const DeviceArray<cl_ulong>& bits, std::size_t count, DeviceList& list) {
   list.told_ = nullptr;
-  if (commands_.shape().asks_lengths) {
+  if (commands_.shape().is_near) {
     const std::uint32_t total = list_all(stage, bits, count, list.entries_, list.length_);
     list.room_ = total;
     list.told_ = std::make_shared<const std::vector<cl_uint>>(2, total);

@@ -8,7 +8,7 @@ namespace frontier_surfels {
 
 WorkShape shape_for(const Device& device) {
   WorkShape shape;
-  shape.asks_lengths = shape.reads_in_place = device.is_cpu && device.lanes != 1;
+  shape.is_near = device.is_cpu && device.lanes != 1;
   shape.many_items = device.lanes == 1;
   shape.heavy_group = device.is_cpu ? 1 : 64;  // a CPU runs the items of a group one after the other on one core
   shape.view_items = shape.heavy_group == 1 ? 64 : 1 << 14;

@@ -11,8 +11,8 @@ namespace frontier_surfels {
 /// item. A graphics processor wants a hundred thousand work items, a work item alone is a hundred times slower there than on a CPU, and
 /// each time the host waits the device runs dry. The results are the same, bit by bit.
 struct WorkShape {
-  bool asks_lengths = true;       ///< the host waits for the length of each list: a CPU answers at once, and no work item is idle
-  bool reads_in_place = true;     ///< the host looks for what it wants in the device's memory: on a CPU that is its own
+  bool is_near = true;            ///< asking costs little: the host waits for the length of each list, so that no work item is idle, and
+                                  ///< looks for what it wants in the device's memory, which is its own
   bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item

@@ -76,7 +76,7 @@ std::vector<cl_uint> MergedSurfels::plan(const SurfelMap& map, const std::vector
   }
   places_.send(std::move(places));
   constexpr std::size_t kSpare = 4;
-  merged_.grow(PAGE_SLOTS * (MERGE_LEVELS * std::size_t{end_} + 1), before == 0 ? 0 : PAGE_SLOTS * MERGE_LEVELS * std::size_t{before},
+  merged_.grow(PAGE_SLOTS * (MERGE_LEVELS * std::size_t{end_} + 1), PAGE_SLOTS * MERGE_LEVELS * std::size_t{before},
                kSpare);  // whole vectors are read at the end
   counts_.grow(MERGE_LEVELS * std::size_t{end_} + 1, MERGE_LEVELS * std::size_t{before}, kSpare);
   return list;

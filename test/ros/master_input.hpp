@@ -1,7 +1,10 @@
 /// A ROS master for a test that is a single program.
 #pragma once
 
+#include <gtest/gtest.h>
+#include <ros/init.h>
 #include <ros/master.h>
+#include <ros/spinner.h>
 #include <ros/time.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -9,6 +12,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <iostream>
 #include <string>
 
 namespace frontier_surfels {
@@ -45,5 +49,22 @@ class Master {
  private:
   pid_t process_;
 };
+
+/// The main() of such a test. @return its exit code
+inline int run_tests_with_master(int argc, char** argv, const char* name) {
+  testing::InitGoogleTest(&argc, argv);
+  const Master master;
+  ros::init(argc, argv, name);
+  if (!master.wait()) {
+    std::cerr << "The ROS master does not start: run scripts/install_dependencies --test.\n";
+    return 1;
+  }
+  ros::AsyncSpinner spinner(1);  // for what topics call back
+  spinner.start();
+  const int result = RUN_ALL_TESTS();
+  spinner.stop();
+  ros::shutdown();
+  return result;
+}
 
 }  // namespace frontier_surfels

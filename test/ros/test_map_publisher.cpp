@@ -2,12 +2,9 @@
 /// ThreadSanitizer as well: scripts/test --threads.
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
-#include <ros/init.h>
-#include <ros/spinner.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <atomic>
-#include <iostream>
 #include <map>
 #include <thread>
 
@@ -163,18 +160,4 @@ TEST(MapPublisher, WhoFollowsHasTheMapWhateverOthersDo) {
 }  // namespace
 }  // namespace frontier_surfels
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  const frontier_surfels::Master master;
-  ros::init(argc, argv, "test_map_publisher");
-  if (!master.wait()) {
-    std::cerr << "The ROS master does not start: run scripts/install_dependencies --test.\n";
-    return 1;
-  }
-  ros::AsyncSpinner spinner(1);  // for what MapPublisher's topics call back
-  spinner.start();
-  const int result = RUN_ALL_TESTS();
-  spinner.stop();
-  ros::shutdown();
-  return result;
-}
+int main(int argc, char** argv) { return frontier_surfels::run_tests_with_master(argc, argv, "test_map_publisher"); }

@@ -1,10 +1,7 @@
 /// ~octomap_full, read by OctoMap itself: whoever listens has the states of the grid, cell by cell.
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
-#include <ros/init.h>
-#include <ros/spinner.h>
 
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <random>
@@ -169,18 +166,4 @@ TEST_F(OctomapMessage, LeavesOutWhatIsBeyondAnOctree) {
 }  // namespace
 }  // namespace frontier_surfels
 
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  const frontier_surfels::Master master;
-  ros::init(argc, argv, "test_octomap_message");
-  if (!master.wait()) {
-    std::cerr << "The ROS master does not start: run scripts/install_dependencies --test.\n";
-    return 1;
-  }
-  ros::AsyncSpinner spinner(1);  // for what the topics call back
-  spinner.start();
-  const int result = RUN_ALL_TESTS();
-  spinner.stop();
-  ros::shutdown();
-  return result;
-}
+int main(int argc, char** argv) { return frontier_surfels::run_tests_with_master(argc, argv, "test_octomap_message"); }
