@@ -133,13 +133,13 @@ class DeviceArray {
     replace(bigger, rows * width);
   }
 
-  /// Writes values from element `offset` on, growing if needed. Elements before `offset` stay.
+  /// Writes values from element `offset` on, growing if needed. Elements before `offset` stay. Commands may still run afterwards: OpenCL
+  /// lets a blocking write return as soon as it has copied the values.
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
     FaultInjection::waits();
     commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
-    commands_->waited();
   }
 
   /// As write(), but does not wait for the device.
