@@ -24,7 +24,7 @@ using namespace reference;
 Commands& other_commands() {
   static auto* const commands = [] {
     Device device = test_device();
-    device.is_cpu = !device.is_cpu;
+    device.is_pocl_cpu = !device.is_pocl_cpu;
     return new Commands(device);
   }();
   return *commands;

@@ -92,7 +92,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
                   0, 255},
         config.device_index);
   field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
-  field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU, 1 on other devices", 0, 16},
+  field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU with PoCL, 1 on other devices", 0, 16},
         config.lanes);
 
   group = "Working image and grid";

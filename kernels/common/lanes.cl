@@ -1,7 +1,8 @@
 // LANES points at once: one source for two widths.
 //
-// A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU, whose vectors are used
-// that way, and 1 on a graphics processor, which has a work item for each point. floatv, intv, uintv and ulongv hold one number for each of
+// A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU with PoCL, which uses its
+// vectors that way, and 1 on other devices, which have a work item for each point. So is HEAVY_GROUP, the number of work items in a group of
+// the kernels with much work per item. floatv, intv, uintv and ulongv hold one number for each of
 // the LANES: they are vectors of 16, or plain numbers. convert_..., as_..., vloadv and vstorev do for them what OpenCL's functions do for
 // its types. Only this file depends on the width.
 //

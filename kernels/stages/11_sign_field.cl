@@ -57,10 +57,6 @@ INLINE float3 ellipsoid_extents(const ViewSurfel* s, float thickness) {
                   ellipsoid_extent(s, thickness, (float3)(0.0f, 0.0f, 1.0f)));
 }
 
-#ifndef SIGN_FIELD_GROUP
-#define SIGN_FIELD_GROUP 64  // work items of a group; a CPU has 1, which needs no atomics
-#endif
-
 #define PADDED_K (TILE_K + 2)
 #define BEYOND 8  // a vector that begins in the last row may end behind it
 
@@ -79,7 +75,8 @@ typedef struct {
   uint any;
 } NeededPaths;
 
-#if SIGN_FIELD_GROUP == 1
+// One work item needs no atomics.
+#if HEAVY_GROUP == 1
 #define OR(target, value) ((target) |= (value))
 INLINE void accumulate(__local int* target, int8 values) { vstore8(vload8(0, target) + values, 0, target); }
 #else
@@ -93,7 +90,7 @@ INLINE void accumulate(__local int* target, int8 values) {
 
 // Sets numbers to zero, all work items of the group together.
 INLINE void clear(__local int* numbers, size_t bytes) {
-  for (int n = get_local_id(0); n < (int)(bytes / sizeof(int)); n += SIGN_FIELD_GROUP) numbers[n] = 0;
+  for (int n = get_local_id(0); n < (int)(bytes / sizeof(int)); n += HEAVY_GROUP) numbers[n] = 0;
 }
 INLINE void clear_tile(__local SignFieldTile* tile) {
   clear(tile->i, sizeof(tile->i));
@@ -293,7 +290,7 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
 // One work-group handles a tile. Tiles without a path to be walked are left as they are.
 //   in  lines: of 10_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
 //   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; they are right on the paths to be walked
-__kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign_field(const Frame f, __global const uint* lines,
+__kernel __attribute__((reqd_work_group_size(HEAVY_GROUP, 1, 1))) void sign_field(const Frame f, __global const uint* lines,
                                                                                        __global const ViewSurfel* view_surfels,
                                                                                        __global const uint* tile_begin,
                                                                                        __global const uint* tile_surfels,
@@ -309,7 +306,7 @@ __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign
   const bool walked = needed.any != 0;
   if (walked) clear_tile(&tile);
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint n = tile_begin[number] + lane; walked && n < tile_begin[number + 1]; n += SIGN_FIELD_GROUP) {
+  for (uint n = tile_begin[number] + lane; walked && n < tile_begin[number + 1]; n += HEAVY_GROUP) {
     const ViewSurfel s = view_surfels[tile_surfels[n]];
     add_surfel(&tile, &needed, &f.limits, &s, origin);
   }
@@ -317,7 +314,7 @@ __kernel __attribute__((reqd_work_group_size(SIGN_FIELD_GROUP, 1, 1))) void sign
 
   const size_t plane = 2 * (size_t)f.grid.size_i * f.grid.size_j * f.grid.words_k;
   const int peak = (int)f.limits.peak;
-  for (int column = lane; walked && column < TILE_I * TILE_J; column += SIGN_FIELD_GROUP) {
+  for (int column = lane; walked && column < TILE_I * TILE_J; column += HEAVY_GROUP) {
     const int i = column / TILE_J, j = column % TILE_J;
     if (origin.x + i >= f.grid.size_i || origin.y + j >= f.grid.size_j) continue;
     __global uint* out = events + 2 * word_index(&f.grid, origin.x + i, origin.y + j, origin.z >> 6) + ((origin.z >> 5) & 1);

@@ -11,9 +11,9 @@
 #define TILE_CHUNKS (TILE_ENTRIES / LANES)
 #define GROUP_TILES (LANES == 1 ? 1 : WORD_TILES)  // tiles that a work-group has; where it has few, there are more groups
 
-// On a CPU a work-group has one item (src/opencl/work_shape.cpp), which waits for nobody; and PoCL takes minutes to compile barriers within
+// A work-group of one item waits for nobody, and PoCL, where it has one (src/opencl/work_shape.hpp), takes minutes to compile barriers within
 // branches and loops.
-#ifdef ON_CPU
+#if HEAVY_GROUP == 1
 #define GROUP_BARRIER(flags)
 #else
 #define GROUP_BARRIER(flags) barrier(flags)

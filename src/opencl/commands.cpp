@@ -41,7 +41,7 @@ void retire(const cl::CommandQueue& queue, const Device& device) {
 
 std::string build_options(const Device& device) {
   return std::string("-cl-std=CL1.2 -Werror") + rounding_option(device) + " -DLANES=" + std::to_string(device.lanes) +
-         (device.is_cpu ? " -DON_CPU" : "") + " -DSIGN_FIELD_GROUP=" + std::to_string(shape_for(device).heavy_group);
+         (device.is_cpu ? " -DON_CPU" : "") + " -DHEAVY_GROUP=" + std::to_string(shape_for(device).heavy_group);
 }
 
 Commands::Commands(Device device) : device_(std::move(device)) {

@@ -10,7 +10,7 @@ WorkShape shape_for(const Device& device) {
   WorkShape shape;
   shape.is_near = device.is_cpu && device.lanes != 1;
   shape.many_items = device.lanes == 1;
-  shape.heavy_group = device.is_cpu ? 1 : 64;  // a CPU runs the items of a group one after the other on one core
+  shape.heavy_group = device.is_pocl_cpu ? 1 : 64;
   shape.view_items = shape.heavy_group == 1 ? 64 : 1 << 14;
   if (shape.many_items) {
     shape.scan_alone = 16;
@@ -19,7 +19,7 @@ WorkShape shape_for(const Device& device) {
     shape.list_chunk = 4;
     shape.sort_chunks = 512;
     shape.sort_group = 64;
-  } else if (device.prefers_one_item) {
+  } else if (device.is_pocl_cpu) {
     shape.scan_alone = 1 << 16;
     shape.list_alone = 1 << 18;
     shape.sort_alone = 1 << 14;

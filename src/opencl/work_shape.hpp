@@ -7,9 +7,11 @@
 
 namespace frontier_surfels {
 
-/// A CPU has few cores with wide vectors, and on PoCL one more launch, or a group's barrier, costs more than a small job done by one work
-/// item. A graphics processor wants a hundred thousand work items, a work item alone is a hundred times slower there than on a CPU, and
-/// each time the host waits the device runs dry. The results are the same, bit by bit.
+/// A CPU has few cores with wide vectors. PoCL runs the items of a group there one after the other on one core, takes minutes to compile
+/// barriers within branches, and one more launch, or a group's barrier, costs it more than a small job done by one work item. (llvmpipe
+/// ends loops after 65535 turns: there no item may do a job alone.) A graphics processor wants a hundred thousand work items, a work item
+/// alone is a hundred times slower there than on a CPU, and each time the host waits the device runs dry. The results are the same, bit by
+/// bit.
 struct WorkShape {
   bool is_near = true;            ///< asking costs little: the host waits for the length of each list, so that no work item is idle, and
                                   ///< looks for what it wants in the device's memory, which is its own
