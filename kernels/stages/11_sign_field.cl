@@ -291,10 +291,10 @@ INLINE void load_needed(__local NeededPaths* needed, const Grid* g, __global con
 //   in  lines: of 10_needed_paths;  view_surfels: of place_surfels;  tile_begin[tiles + 1]: where each tile's list starts in tile_surfels
 //   out events[3][EVENT_PLANES]: bit fields, each word as two 32-bit halves, the lower one first; they are right on the paths to be walked
 __kernel __attribute__((reqd_work_group_size(HEAVY_GROUP, 1, 1))) void sign_field(const Frame f, __global const uint* lines,
-                                                                                       __global const ViewSurfel* view_surfels,
-                                                                                       __global const uint* tile_begin,
-                                                                                       __global const uint* tile_surfels,
-                                                                                       __global uint* events) {
+                                                                                  __global const ViewSurfel* view_surfels,
+                                                                                  __global const uint* tile_begin,
+                                                                                  __global const uint* tile_surfels,
+                                                                                  __global uint* events) {
   __local SignFieldTile tile;
   __local NeededPaths needed;
   const int number = get_group_id(0), lane = get_local_id(0);

@@ -11,8 +11,8 @@
 #define TILE_CHUNKS (TILE_ENTRIES / LANES)
 #define GROUP_TILES (LANES == 1 ? 1 : WORD_TILES)  // tiles that a work-group has; where it has few, there are more groups
 
-// A work-group of one item waits for nobody, and PoCL, where it has one (src/opencl/work_shape.hpp), takes minutes to compile barriers within
-// branches and loops.
+// A work-group of one item waits for nobody, and PoCL, where it has one (src/opencl/work_shape.hpp), takes minutes to compile barriers
+// within branches and loops.
 #if HEAVY_GROUP == 1
 #define GROUP_BARRIER(flags)
 #else
