@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "opencl/commands.hpp"
+#include "opencl/fault_injection.hpp"
 #include "stages/test_device.hpp"
 
 namespace frontier_surfels {
@@ -25,7 +26,7 @@ class StageCommands : public testing::Test {
     array_.fill("test", 1, kSize);
   }
 
-  static constexpr std::size_t kSize = 1000;
+  static constexpr std::size_t kSize = 1000, kLarge = 1 << 24;
   DeviceArray<cl_int> array_;
 };
 
@@ -42,6 +43,38 @@ TEST_F(StageCommands, ABlockingReadEndsAllEarlierCommands) {
   const auto values = keep_values(test_commands());
   EXPECT_EQ(array_.read(kSize), std::vector<cl_int>(kSize, 1));
   EXPECT_TRUE(values.expired());
+}
+
+/// Commands that still run read what was sent, even if a failure has ended the call that sent it.
+TEST_F(StageCommands, SentValuesOutliveTheirArray) {
+  DeviceArray<cl_int> large(test_commands());
+  large.resize(kLarge);
+  auto sent = std::make_unique<SentArray<cl_int>>(test_commands());
+  sent->send(std::vector<cl_int>(kSize, 6));
+  EXPECT_EQ(array_.read_one(0), 1);  // the host has waited since
+  for (int n = 0; n < 4; ++n) large.fill("test", n, kLarge);
+  test_commands().queue().enqueueCopyBuffer((*sent)(), array_(), 0, 0, kSize * sizeof(cl_int));
+  sent.reset();
+  const std::vector<cl_int> other(kSize, 7);  // would take the place of freed values
+  EXPECT_EQ(array_.read(kSize), std::vector<cl_int>(kSize, 6));
+}
+
+/// Drivers of graphics processors allocate memory when it is used for the first time.
+TEST_F(StageCommands, ABufferThatCannotBeUsedReplacesNoOther) {
+  Device device = test_device();
+  device.shares_memory = false;
+  Commands commands(device);
+  DeviceArray<cl_int> array(commands);
+  array.send(std::vector<cl_int>(kSize, 8));
+  const std::size_t before = array.size(), bytes = commands.allocated_bytes();
+  FaultInjection::fail(1, 1);  // the buffer is made, but its first use fails
+  EXPECT_THROW(array.resize(100 * kSize), AllocationError);
+  FaultInjection::stop();
+  EXPECT_EQ(array.size(), before);
+  EXPECT_EQ(commands.allocated_bytes(), bytes);
+  EXPECT_EQ(array.read(kSize), std::vector<cl_int>(kSize, 8));
+  array.resize(100 * kSize);
+  EXPECT_GE(array.size(), 100 * kSize);
 }
 
 /// Each of them has its own values, and the order of the commands decides.

@@ -82,6 +82,8 @@ class Commands {
   std::string memory_text() const;  ///< what is allocated and what the device has, as a clause for people
 
  private:
+  void claim(const cl::Buffer& buffer);
+
   Device device_;
   WorkShape shape_;
   cl::CommandQueue queue_;
@@ -211,32 +213,36 @@ template <typename T>
 class SentArray {
  public:
   explicit SentArray(Commands& commands) : commands_(&commands), array_(commands) {}
-  ~SentArray() { commands_->release(shared_bytes()); }
+  ~SentArray() { commands_->release(shared_bytes_); }
   SentArray(const SentArray&) = delete;
   SentArray& operator=(const SentArray&) = delete;
 
   void send(std::vector<T> values) {
     if (values.empty()) values.resize(1);  // OpenCL has no empty buffers
     if (!commands_->device().shares_memory) return array_.send(std::move(values));
-    auto shared = std::make_shared<std::vector<T>>(std::move(values));
-    commands_->keep(shared);
-    commands_->keep(shared_);  // running kernels may still read the values sent before
     FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
-    buffer_ = cl::Buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, shared->size() * sizeof(T), shared->data());
-    commands_->release(shared_bytes());
-    shared_ = std::move(shared);
-    commands_->allocated(shared_bytes());
+    const std::size_t bytes = values.size() * sizeof(T);
+    buffer_ = buffer_over(std::make_unique<std::vector<T>>(std::move(values)));
+    commands_->release(shared_bytes_);
+    shared_bytes_ = bytes;
+    commands_->allocated(shared_bytes_);
   }
 
   const cl::Buffer& operator()() const { return commands_->device().shares_memory ? buffer_ : array_(); }
 
  private:
-  std::size_t shared_bytes() const { return shared_ == nullptr ? 0 : shared_->size() * sizeof(T); }
+  /// The values live as long as the buffer, which commands that use it keep: they may still run when this object goes.
+  cl::Buffer buffer_over(std::unique_ptr<std::vector<T>> values) const {
+    cl::Buffer buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, values->size() * sizeof(T), values->data());
+    buffer.setDestructorCallback([](cl_mem, void* own) { delete static_cast<std::vector<T>*>(own); }, values.get());
+    values.release();
+    return buffer;
+  }
 
   Commands* commands_;
-  DeviceArray<T> array_;                          ///< used on devices with memory of their own
-  std::shared_ptr<const std::vector<T>> shared_;  ///< used on devices that share the host's memory
-  cl::Buffer buffer_;                             ///< buffer over shared_
+  DeviceArray<T> array_;  ///< used on devices with memory of their own
+  cl::Buffer buffer_;     ///< used on devices that share the host's memory
+  std::size_t shared_bytes_ = 0;
 };
 
 }  // namespace frontier_surfels
