@@ -20,6 +20,7 @@ DeviceFacts device(const std::string& platform, const std::string& name, const s
   facts.global_bytes = std::uint64_t{8} << 30;
   facts.largest_buffer_bytes = std::uint64_t{2} << 30;
   facts.local_bytes = 48 * 1024;
+  facts.group_items = 256;
   return facts;
 }
 
@@ -85,13 +86,15 @@ TEST(DeviceRanking, TheConfigurationNarrowsIt) {
 }
 
 TEST(DeviceRanking, UnusableDevicesArePassedOver) {
-  DeviceFacts away = kFastCard, no_compiler = kFastCard, big_endian = kFastCard, no_memory = kFastCard, faulty = kFastCard;
+  DeviceFacts away = kFastCard, no_compiler = kFastCard, big_endian = kFastCard, no_memory = kFastCard, small_groups = kFastCard,
+              faulty = kFastCard;
   away.available = false;
   no_compiler.has_compiler = false;
   big_endian.little_endian = false;
   no_memory.local_bytes = 32 * 1024 - 1;
+  small_groups.group_items = 63;
   faulty.fault = "its driver answers with nonsense";
-  for (const DeviceFacts& unusable : {away, no_compiler, big_endian, no_memory, faulty}) {
+  for (const DeviceFacts& unusable : {away, no_compiler, big_endian, no_memory, small_groups, faulty}) {
     const std::string lack = lacking(unusable);
     SCOPED_TRACE(lack);
     EXPECT_NE(lack, "");

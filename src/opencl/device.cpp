@@ -34,6 +34,7 @@ DeviceFacts facts_of(const std::string& platform, const cl::Device& device) {
     facts.global_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
     facts.largest_buffer_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     facts.local_bytes = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+    facts.group_items = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();
     facts.available = device.getInfo<CL_DEVICE_AVAILABLE>();
     facts.has_compiler = device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>();
     facts.little_endian = device.getInfo<CL_DEVICE_ENDIAN_LITTLE>();

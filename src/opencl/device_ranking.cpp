@@ -10,7 +10,7 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::uint64_t kLocalBytes = 32 * 1024;  // that the kernels need
+constexpr std::uint64_t kLocalBytes = 32 * 1024, kGroupItems = 64;  // that the kernels need
 
 constexpr const char* kNothing = "There is no OpenCL device at all: install a driver, or pocl-opencl-icd to use the CPU.";
 
@@ -72,6 +72,7 @@ std::string lacking(const DeviceFacts& device) {
   add(!device.has_compiler, "it has no compiler for OpenCL C");
   add(!device.little_endian, "it is big endian, which the bit fields do not support");
   add(device.local_bytes < kLocalBytes, "it has less than 32 KiB of local memory");
+  add(device.group_items < kGroupItems, "it has no work-groups of 64 work items");
   add(!device.fault.empty(), device.fault);
   return text;
 }

@@ -16,7 +16,7 @@ struct DeviceFacts {
   std::string platform, name, driver, version;
   std::string type;  ///< gpu, accelerator or cpu
   unsigned compute_units = 0, clock_mhz = 0;
-  std::uint64_t global_bytes = 0, largest_buffer_bytes = 0, local_bytes = 0;
+  std::uint64_t global_bytes = 0, largest_buffer_bytes = 0, local_bytes = 0, group_items = 0;
   bool available = true, has_compiler = true, little_endian = true;
   std::string fault;  ///< anything else that keeps it from running the kernels, as a clause or sentence without its full stop; "": nothing
 };
