@@ -30,12 +30,14 @@ class StageCommands : public testing::Test {
   DeviceArray<cl_int> array_;
 };
 
-/// A blocking write may return while earlier commands have not even begun; other drivers than PoCL do so.
-TEST_F(StageCommands, ABlockingWriteEndsNoEarlierCommand) {
+/// Before it lets go of their values: drivers may return from a blocking write while earlier commands have not even begun.
+TEST_F(StageCommands, AWriteWaitsForAllEarlierCommands) {
   const auto values = keep_values(test_commands());
-  array_.write(std::vector<cl_int>(kSize, 2));
+  FaultInjection::fail(1, 1);  // the write succeeds, but the wait fails
+  EXPECT_THROW(array_.write(std::vector<cl_int>(kSize, 2)), cl::Error);
+  FaultInjection::stop();
   EXPECT_FALSE(values.expired());
-  test_commands().wait();
+  array_.write(std::vector<cl_int>(kSize, 2));
   EXPECT_TRUE(values.expired());
 }
 

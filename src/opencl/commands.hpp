@@ -135,13 +135,12 @@ class DeviceArray {
     replace(bigger, rows * width);
   }
 
-  /// Writes values from element `offset` on, growing if needed. Elements before `offset` stay. Commands may still run afterwards: OpenCL
-  /// lets a blocking write return as soon as it has copied the values.
+  /// Writes values from element `offset` on, growing if needed, and waits for all commands. Elements before `offset` stay.
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
     grow(offset + values.size(), offset);
-    FaultInjection::waits();
     commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
+    commands_->wait();  // drivers may return from a blocking write while earlier commands have not begun
   }
 
   /// As write(), but does not wait for the device.
