@@ -7,7 +7,6 @@
 #include <CL/opencl.hpp>
 #include <algorithm>
 #include <chrono>
-#include <cinttypes>
 #include <cstdio>
 #include <exception>
 #include <map>
@@ -78,7 +77,7 @@ void measure(const RawFrames& frames, const Config& config) {
   const std::string size = std::to_string(frames.intrinsics.width / config.decimation) + " x " +
                            std::to_string(frames.intrinsics.height / config.decimation) + " pixels";
   print_row(size.c_str(), times, report);
-  std::printf("    checksum of the map          %016" PRIx64 "\n", map_checksum(mapper.surfels()));
+  std::printf("    checksum of the map          %s\n", checksum_text(map_checksum(mapper.surfels())).c_str());
   for (const auto& [stage, ms] : times.stages_ms) std::printf("    %-28s %6.2f ms\n", stage.c_str(), quantile(ms, 0.5));
 }
 
