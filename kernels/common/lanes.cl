@@ -18,7 +18,7 @@
 
 // On a CPU without AVX-512, Clang warns that vectors of 16 are passed to functions in another way than with it. Nothing here is linked with
 // code that was compiled with it, and the warning would be an error.
-#if defined(__clang__)
+#if defined(ON_CPU) && defined(__clang__)
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif
 
