@@ -199,6 +199,22 @@ TEST(Summary, HasTheRunsValues) {
   EXPECT_DOUBLE_EQ(json["exact"]["miss_2cm"], 0.0005);
 }
 
+/// Graphics processors measure the stages in few frames: Config::stage_times_every.
+TEST(Summary, TimesOfStagesAreThoseOfTimedFrames) {
+  const auto yardsticks = yardsticks_of_a_frame(0.02);
+  Run run = run_of(12);
+  for (FrameRecord& frame : run.frames)
+    if (frame.report.total_ms != 8) frame.report.stages.clear();
+  ordered_json json = summary_json({"a/folder", {}}, run, *yardsticks, some_scores());
+  EXPECT_DOUBLE_EQ(json["time_ms"]["mean"], 9);
+  EXPECT_DOUBLE_EQ(json["time_ms"]["stages"]["sweeps"]["mean"], 2);
+  EXPECT_DOUBLE_EQ(json["time_ms"]["stages"]["median"]["median"], 4);
+  run.frames[7].report.stages.clear();
+  run.frames[0].report.stages = {{"sweeps", 1}};  // a frame of the warm-up
+  json = summary_json({"a/folder", {}}, run, *yardsticks, some_scores());
+  EXPECT_TRUE(json["time_ms"]["stages"].empty());
+}
+
 TEST(Summary, HasNoPoseCorrectionsIfThereAreNone) {
   auto run = run_of(12);
   run.config.correct_poses = false;

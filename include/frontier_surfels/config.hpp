@@ -13,6 +13,7 @@ struct Config {
   int device_index = 0;
   int threads = 0;
   int lanes = 0;
+  int stage_times_every = 0;
 
   // Working image and grid (paper 3.1)
   double depth_unit = 0.001;
@@ -94,6 +95,11 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"threads", "", "number of compute units to use, if the device can be divided; 0: all", 0, 4096}, config.threads);
   field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU with PoCL, 1 on other devices", 0, 16},
         config.lanes);
+  field(FieldInfo{"stage_times_every", "",
+                  "the device's time of each stage is measured in one frame of so many; 0: in every frame on a CPU, in one of 16 on other "
+                  "devices, where measuring costs more than launching",
+                  0, 1000000},
+        config.stage_times_every);
 
   group = "Working image and grid";
   field(FieldInfo{"depth_unit", "m", "one step of a 16-bit depth image; images of 32 bits and folders in TUM's layout are in metres anyway",

@@ -55,7 +55,9 @@ void integrate_again(benchmark::State& state, Mapper& mapper, const DepthFrame& 
 ordered_json measure_row(const Options& options, const Input& input, const Config& config) {
   ordered_json row = {{"input", input.name()}, {"threads", config.threads}, {"recent_views", config.recent_views}};
   attempt(row, [&] {
-    Mapper mapper(config);
+    Config timed = config;
+    timed.stage_times_every = 1;
+    Mapper mapper(timed);
     const auto source = input.open();
     const auto run = run_frames(mapper, input, *source, options);
     for (const std::string& name : replay::stage_names(run.frames)) row["stages"][name] = 0;  // puts them in order

@@ -25,10 +25,10 @@ Camera::Camera(Commands& commands, const Intrinsics& intrinsics, const Config& c
   words_i_.write(view.words_i);
 }
 
-void Camera::set_image(const WorkingImage& image) {
-  depth_.send(image.depth);
-  color_.send(image.color);
-  has_color_ = !image.color.empty();
+void Camera::set_image(const std::shared_ptr<const WorkingImage>& image) {
+  depth_.send(std::shared_ptr<const std::vector<float>>(image, &image->depth));
+  color_.send(std::shared_ptr<const std::vector<std::uint32_t>>(image, &image->color));
+  has_color_ = !image->color.empty();
 }
 
 Cameras::Cameras(Commands& commands, const Config& config) : commands_(commands), config_(config) {

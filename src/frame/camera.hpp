@@ -1,6 +1,8 @@
 /// A depth camera on the device: the grid of its views, the grid's fixed tables, and the newest image.
 #pragma once
 
+#include <memory>
+
 #include "common/shared.h"
 #include "frame/camera_list.hpp"
 #include "frame/view_grid.hpp"
@@ -17,7 +19,7 @@ class Camera {
   Camera(Commands& commands, const Intrinsics& intrinsics, const Config& config);
 
   /// Sends a frame's working image to the device. Its intrinsics must be this camera's.
-  void set_image(const WorkingImage& image);
+  void set_image(const std::shared_ptr<const WorkingImage>& image);
 
   const Intrinsics& intrinsics() const { return intrinsics_; }
   const Grid& grid() const { return grid_; }

@@ -57,7 +57,7 @@ SeenPoints::SeenPoints(Commands& commands, double block_size)
       gathered_list_(commands) {
   clear();
   send_entries("changes");
-  slots_.send({0});
+  slots_.send(std::vector<cl_int>{0});
 }
 
 /// The device gets it with the next send_entries().

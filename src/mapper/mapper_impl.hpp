@@ -95,11 +95,13 @@ struct Mapper::Impl {
   void remember_forgotten();
   Report integrate(const DepthFrame& input);
   Report update(const DepthFrame& input);
-  Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
+  std::uint64_t stage_times_every() const;
+  Frame begin_frame(const std::shared_ptr<const WorkingImage>& image, const Eigen::Isometry3d& T_world_camera, Camera& camera,
+                    std::uint32_t number);
   double seen_spacing(const Camera& camera) const;
   SurfelVisit::Found propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
-  void finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report);
+  void finish_frame(std::uint32_t number, const WorkingImage& image, const Camera& camera, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);
   std::vector<SpaceState> states(const std::vector<Eigen::Vector3f>& points_world);
   StateChanges state_changes(std::uint64_t since, double resolution);

@@ -1,6 +1,7 @@
 /// The flow chart of a frame: the paper's stages, and ours, in the order in which they run.
 #include <chrono>
 #include <limits>
+#include <memory>
 
 #include "frame/working_image.hpp"
 #include "map/view_blocks.hpp"
@@ -47,16 +48,18 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   report.stamp = input.stamp;
   report.sequence = sequence + 1;
   const auto number = static_cast<std::uint32_t>(report.sequence);
+  commands.time_stages(report.sequence % stage_times_every() == 0);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const WorkingImage image = make_working_image(input, config, cameras.max_voxels());
+  const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels()));
+  const WorkingImage& image = *shared_image;
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
 
   // Pose correction - ours: the jitter of the recorded poses is taken out
   const CorrectedPose pose = pose_correction.correct(image, input.T_world_camera);
   report.T_world_camera = pose.T_world_camera;
-  Frame frame = begin_frame(image, pose.T_world_camera, camera, number);
+  Frame frame = begin_frame(shared_image, pose.T_world_camera, camera, number);
 
   // Observed space C~ - 3.3, eq. (9)-(11)
   observed.compute(frame, camera);
@@ -76,19 +79,27 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Labels and colour - 3.5
   label_surfels(commands, frame, camera, observed.column_end(), map);
 
-  finish_frame(number, image, pose, report);
+  finish_frame(number, image, camera, pose, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   return report;
 }
 
-Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
+/// Stages are timed in one frame of so many.
+std::uint64_t Mapper::Impl::stage_times_every() const {
+  constexpr std::uint64_t kSeldom = 16;
+  if (config.stage_times_every > 0) return static_cast<std::uint64_t>(config.stage_times_every);
+  return commands.device().is_cpu ? 1 : kSeldom;
+}
+
+Frame Mapper::Impl::begin_frame(const std::shared_ptr<const WorkingImage>& image, const Eigen::Isometry3d& T_world_camera, Camera& camera,
+                                std::uint32_t number) {
   begin_call();
   remember_forgotten();
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.maps(), sequence);
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
   camera.set_image(image);
-  views.set_current(image, T_world_camera);
+  views.set_current(*image, T_world_camera);
   seen.choose_spacing(seen_spacing(camera));
   seen.open_window(map.window());
   taking_back.open_window(map.window(), seen);
@@ -172,10 +183,11 @@ void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T
   }
 }
 
-void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const CorrectedPose& pose, Report& report) {
+void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const Camera& camera, const CorrectedPose& pose,
+                                Report& report) {
   map.finish_frame("labels", number);
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
-  taking_back.add_to_last_frames(image, pose.T_world_camera, views.current_number());
+  taking_back.add_to_last_frames(camera, image, pose.T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
   pose_correction.add(image, pose);
   report.view_kept = views.keep_current();

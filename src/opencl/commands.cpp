@@ -42,7 +42,7 @@ void retire(const cl::CommandQueue& queue, const Device& device) {
 /// Warnings are errors on PoCL, with which the kernels are developed. Other compilers may warn of something else, and must still build
 /// them.
 std::string build_options(const Device& device) {
-  return std::string("-cl-std=CL1.2") + (device.is_pocl_cpu ? " -Werror" : "") + rounding_option(device) +
+  return std::string("-cl-std=CL1.2") + (device.is_pocl ? " -Werror" : "") + rounding_option(device) +
          " -DLANES=" + std::to_string(device.lanes) + (device.is_cpu ? " -DON_CPU" : "") +
          " -DHEAVY_GROUP=" + std::to_string(shape_for(device).heavy_group);
 }
@@ -50,10 +50,11 @@ std::string build_options(const Device& device) {
 Commands::Commands(Device device) : device_(std::move(device)) {
   try {
     shape_ = shape_for(device_);
-    queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
+    timed_queue_ = cl::CommandQueue(device_.context, device_.device, CL_QUEUE_PROFILING_ENABLE);
+    plain_queue_ = cl::CommandQueue(device_.context, device_.device);
     max_buffer_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     device_bytes_ = device_.device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
-    const auto cache = device_.keeps_programs ? program_cache_folder() : std::filesystem::path();
+    const auto cache = !device_.is_pocl ? program_cache_folder() : std::filesystem::path();
     for (const auto& kernel : build_kernels(device_, kernel_source(), build_options(device_), cache).kernels)
       kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
   } catch (const cl::Error& error) {
@@ -67,14 +68,21 @@ Commands::~Commands() {
   } catch (const cl::Error&) {
     // The device is lost, so no command reads them any more.
   }
-  retire(queue_, device_);
+  retire(timed_queue_, device_);
+  retire(plain_queue_, device_);
 }
 
 void Commands::wait() {
   if (!pending_) return;
   FaultInjection::step(Call::kWait, "clFinish");
-  queue_.finish();
+  queue_now().finish();
   waited();
+}
+
+void Commands::time_stages(bool timed) {
+  if (timed == times_stages_) return;
+  wait();  // the queues do not wait for each other
+  times_stages_ = timed;
 }
 
 std::vector<StageTime> Commands::take_times() {

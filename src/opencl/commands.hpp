@@ -35,7 +35,7 @@ class Commands {
   cl::CommandQueue& queue(Call kind = Call::kLaunch) {
     FaultInjection::step(kind, "clEnqueue");
     pending_ = true;
-    return queue_;
+    return queue_now();
   }
 
   /// Launches a kernel with at least `items` work items in groups of `group`. Its device time counts towards `stage`.
@@ -47,11 +47,24 @@ class Commands {
 
   template <typename... Args>
   void run(const char* stage, const char* kernel, const cl::NDRange& global, const cl::NDRange& local, const Args&... args) {
-    cl::KernelFunctor<Args...> functor(kernels_.at(kernel));
-    note(stage, functor(cl::EnqueueArgs(queue(), global, local), args...));
+    cl::Kernel& called = kernels_.at(kernel);
+    cl_uint number = 0;
+    (called.setArg(number++, args), ...);
+    timed(stage, [&](cl::Event* event) { queue().enqueueNDRangeKernel(called, cl::NullRange, global, local, nullptr, event); });
   }
 
-  void note(const char* stage, cl::Event event) { events_.emplace_back(stage, std::move(event)); }  ///< counts its time towards `stage`
+  /// Calls enqueue(event) for one command, with a null event unless its time is to count towards `stage`.
+  template <typename Enqueue>
+  void timed(const char* stage, Enqueue enqueue) {
+    if (!times_stages_) return enqueue(nullptr);
+    cl::Event event;
+    enqueue(&event);
+    events_.emplace_back(stage, std::move(event));
+  }
+
+  /// Shall the commands from now on be timed? On a graphics processor all of them take twice as long then. Waits for the device when this
+  /// changes.
+  void time_stages(bool timed);
 
   /// Called after a read that has waited for the device: commands run in their order, so all others have ended as well.
   void waited() {
@@ -63,7 +76,7 @@ class Commands {
   void wait();
 
   /// The same.
-  /// @return device time of each stage since the last call, in the order of their first launch
+  /// @return device time of each stage since the last call, in the order of their first launch; empty where they were not timed
   std::vector<StageTime> take_times();
 
   /// Drops the times, without waiting.
@@ -83,15 +96,17 @@ class Commands {
 
  private:
   void claim(const cl::Buffer& buffer);
+  cl::CommandQueue& queue_now() { return times_stages_ ? timed_queue_ : plain_queue_; }
 
   Device device_;
   WorkShape shape_;
-  cl::CommandQueue queue_;
+  cl::CommandQueue timed_queue_, plain_queue_;  ///< one of them has commands at a time
   std::map<std::string, cl::Kernel> kernels_;
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
   std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0, device_bytes_ = 0;
-  bool pending_ = false;  ///< commands may still run
+  bool pending_ = false;      ///< commands may still run
+  bool times_stages_ = true;  ///< launches have events
 };
 
 /// A device buffer of T that grows and never shrinks.
@@ -144,12 +159,20 @@ class DeviceArray {
   }
 
   /// As write(), but does not wait for the device.
-  void send(std::vector<T> values, std::size_t offset = 0) {
-    if (values.empty()) return;
-    grow(offset + values.size(), offset);
-    const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
-    commands_->keep(kept);
-    commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_FALSE, offset * sizeof(T), kept->size() * sizeof(T), kept->data());
+  void send(std::vector<T> values, std::size_t offset = 0) { send(std::make_shared<const std::vector<T>>(std::move(values)), offset); }
+
+  /// The same for values that others read, too.
+  void send(const std::shared_ptr<const std::vector<T>>& values, std::size_t offset = 0) {
+    if (values->empty()) return;
+    grow(offset + values->size(), offset);
+    commands_->keep(values);
+    commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_FALSE, offset * sizeof(T), values->size() * sizeof(T), values->data());
+  }
+
+  /// Copies the first `size` elements of another array to element `offset` and those behind it, for which there must be room.
+  void copy_from(const cl::Buffer& other, std::size_t size, std::size_t offset) {
+    if (size == 0) return;
+    commands_->queue(Call::kCopy).enqueueCopyBuffer(other, buffer_, 0, offset * sizeof(T), size * sizeof(T));
   }
 
   std::vector<T> read(std::size_t size, std::size_t offset = 0) const {
@@ -196,9 +219,9 @@ class DeviceArray {
   }
 
   void fill(const char* stage, const cl::Buffer& buffer, T value, std::size_t size, std::size_t offset) {
-    cl::Event event;
-    commands_->queue(Call::kFill).enqueueFillBuffer(buffer, value, offset * sizeof(T), size * sizeof(T), nullptr, &event);
-    commands_->note(stage, event);
+    commands_->timed(stage, [&](cl::Event* event) {
+      commands_->queue(Call::kFill).enqueueFillBuffer(buffer, value, offset * sizeof(T), size * sizeof(T), nullptr, event);
+    });
   }
 
   Commands* commands_;
@@ -216,12 +239,15 @@ class SentArray {
   SentArray(const SentArray&) = delete;
   SentArray& operator=(const SentArray&) = delete;
 
-  void send(std::vector<T> values) {
-    if (values.empty()) values.resize(1);  // OpenCL has no empty buffers
-    if (!commands_->device().shares_memory) return array_.send(std::move(values));
+  void send(std::vector<T> values) { send(std::make_shared<const std::vector<T>>(std::move(values))); }
+
+  /// The same for values that others read, too.
+  void send(const std::shared_ptr<const std::vector<T>>& values) {
+    if (values->empty()) return send(std::vector<T>(1));  // OpenCL has no empty buffers
+    if (!commands_->device().shares_memory) return array_.send(values);
     FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
-    const std::size_t bytes = values.size() * sizeof(T);
-    buffer_ = buffer_over(std::make_unique<std::vector<T>>(std::move(values)));
+    const std::size_t bytes = values->size() * sizeof(T);
+    buffer_ = buffer_over(values);
     commands_->release(shared_bytes_);
     shared_bytes_ = bytes;
     commands_->allocated(shared_bytes_);
@@ -231,10 +257,13 @@ class SentArray {
 
  private:
   /// The values live as long as the buffer, which commands that use it keep: they may still run when this object goes.
-  cl::Buffer buffer_over(std::unique_ptr<std::vector<T>> values) const {
-    cl::Buffer buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, values->size() * sizeof(T), values->data());
-    buffer.setDestructorCallback([](cl_mem, void* own) { delete static_cast<std::vector<T>*>(own); }, values.get());
-    values.release();
+  cl::Buffer buffer_over(const std::shared_ptr<const std::vector<T>>& values) const {
+    using Kept = std::shared_ptr<const std::vector<T>>;
+    auto kept = std::make_unique<Kept>(values);
+    cl::Buffer buffer(commands_->device().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, values->size() * sizeof(T),
+                      const_cast<T*>(values->data()));
+    buffer.setDestructorCallback([](cl_mem, void* own) { delete static_cast<Kept*>(own); }, kept.get());
+    kept.release();
     return buffer;
   }
 

@@ -116,9 +116,9 @@ Device choose_device(const Config& config) {
     chosen.context = cl::Context(chosen.device);
     chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
     chosen.is_cpu = facts.type == "cpu";
-    chosen.is_pocl_cpu = chosen.is_cpu && facts.platform == kPocl;
+    chosen.is_pocl = facts.platform == kPocl;
+    chosen.is_pocl_cpu = chosen.is_cpu && chosen.is_pocl;
     chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_pocl_cpu ? 16 : 1;
-    chosen.keeps_programs = facts.platform != kPocl;
     facts.compute_units = chosen.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
     chosen.description = describe(facts);
     chosen.choice = choice.why;

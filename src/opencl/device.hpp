@@ -10,14 +10,14 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
-  bool is_pocl_cpu = false;     ///< what WorkShape says of PoCL, which other drivers of CPUs do not share: they compile vectors of 16 for
-                                ///< minutes, and barriers at once
-  int lanes = 1;                ///< points that one work item handles at once: 16 or 1
-  bool shares_memory = false;   ///< the device works in the host's memory
-  bool keeps_programs = false;  ///< built kernels are kept as files; not on PoCL, which has a cache of its own: what ours would gain there
-                                ///< was not measured
-  std::string description;      ///< platform, name and compute units
-  std::string choice;           ///< why this device was taken, for display
+  bool is_pocl = false;        ///< of other platforms' devices we keep the built kernels as files; PoCL has a cache of its own, and what
+                               ///< ours would gain there was not measured
+  bool is_pocl_cpu = false;    ///< what WorkShape says of PoCL, which other drivers of CPUs do not share: they compile vectors of 16 for
+                               ///< minutes, and barriers at once
+  int lanes = 1;               ///< points that one work item handles at once: 16 or 1
+  bool shares_memory = false;  ///< the device works in the host's memory
+  std::string description;     ///< platform, name and compute units
+  std::string choice;          ///< why this device was taken, for display
 };
 
 /// Chooses the device by platform, device_type, device_index and threads of the configuration, see device_ranking.hpp, and the lanes of its

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <numeric>
 
 #include "config/c_locale.hpp"
@@ -122,11 +123,20 @@ std::vector<std::string> stage_names(const std::vector<FrameRecord>& frames) {
   return names;
 }
 
+/// The frames in which the stages were timed: Config::stage_times_every.
+std::vector<FrameRecord> timed_frames(const std::vector<FrameRecord>& frames) {
+  std::vector<FrameRecord> timed;
+  std::copy_if(frames.begin(), frames.end(), std::back_inserter(timed),
+               [](const FrameRecord& frame) { return !frame.report.stages.empty(); });
+  return timed;
+}
+
 ordered_json time_json(const std::vector<FrameRecord>& frames, const std::vector<std::string>& names) {
   const TimeStatistics total = time_statistics(column(frames, total_ms));
+  const std::vector<FrameRecord> timed = timed_frames(frames);
   ordered_json stages = ordered_json::object();
-  for (const std::string& name : names) {
-    stages[name] = mean_and_median(column(frames, [&name](const FrameRecord& frame) { return stage_ms(frame, name); }));
+  for (const std::string& name : timed.empty() ? std::vector<std::string>() : names) {
+    stages[name] = mean_and_median(column(timed, [&name](const FrameRecord& frame) { return stage_ms(frame, name); }));
   }
   return {{"mean", total.mean}, {"median", total.median},           {"p95", total.p95},
           {"max", total.max},   {"rsd_percent", total.rsd_percent}, {"stages", stages}};

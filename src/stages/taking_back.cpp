@@ -239,7 +239,8 @@ void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const R
     if (states[n] != SEEN_MIXED) taken_.set_uniform(bricks[n].table, bricks[n].brick, states[n] == SEEN_ALL);
 }
 
-void TakingBack::add_to_last_frames(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint64_t number) {
+void TakingBack::add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera,
+                                    std::uint64_t number) {
   if (!is_on_) return;
   const std::size_t pixels = image.depth.size();
   if (pixels > room_size_) {
@@ -249,7 +250,7 @@ void TakingBack::add_to_last_frames(const WorkingImage& image, const Eigen::Isom
   }
   const bool is_full = last_frames_.size() == LAST_FRAMES;
   const std::size_t room = is_full ? last_frames_.back().room : last_frames_.size();
-  images_.send(image.depth, room * room_size_);
+  images_.copy_from(camera.depth()(), pixels, room * room_size_);
   if (is_full) last_frames_.pop_back();
   last_frames_.push_front({image.intrinsics, T_world_camera, room, number});
   pixels_ = 0;

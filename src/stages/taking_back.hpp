@@ -45,8 +45,9 @@ class TakingBack {
                      const SeenPoints& seen, Frame* frame);
 
   /// Ends a frame: later ones may ask whether it supports their surfaces.
+  /// @param camera  has the image
   /// @param number  RecentViews::current_number()
-  void add_to_last_frames(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint64_t number);
+  void add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, std::uint64_t number);
 
   /// Forgets all frames and all taken points.
   void clear();

@@ -38,7 +38,7 @@ class FrameFixture {
     map_.open_window(camera_->grid(), T_world_camera);
     seen_.open_window(map_.window());
     taken_.open_window(map_.window());
-    camera_->set_image(image);
+    camera_->set_image(std::make_shared<const WorkingImage>(image));
     views_.set_current(image, T_world_camera);
     frame_ = make_frame(*camera_, map_.window(), views_, &seen_, limits_);
     return frame_;

@@ -105,7 +105,7 @@ class TakingBackFixture : public FrameFixture {
   }
 
   void end(bool keep) {
-    taking.add_to_last_frames(now.image, now.T_world_camera, views().current_number());
+    taking.add_to_last_frames(camera(), now.image, now.T_world_camera, views().current_number());
     if (now.image.depth.size() > largest_) {
       largest_ = now.image.depth.size();
       last.clear();  // as images had no room, they are gone
