@@ -213,5 +213,19 @@ TEST(Sampling, ColoursAreThoseOfTheSameSurface) {
   EXPECT_EQ(working.color[5 * 10 + 6], 0U | 255U << 8 | 9U << 16);
 }
 
+/// Also at the image's edges, beside which there are no colours.
+TEST(Sampling, NothingWithinRangeHasTheMiddlePixelsColour) {
+  Image image(40, 40, std::numeric_limits<float>::infinity());
+  for (int row = 0; row < 40; ++row)
+    for (int column = 0; column < 40; ++column) image.color.insert(image.color.end(), 3, row % 4 == 0 && column % 4 == 0 ? 10 : 200);
+  Config config = config_for(4);
+  config.carve_no_return = true;
+  const WorkingImage working = image.working(config);
+  for (std::size_t pixel = 0; pixel < working.depth.size(); ++pixel) {
+    ASSERT_EQ(working.depth[pixel], -3);
+    ASSERT_EQ(working.color[pixel], 10U | 10U << 8 | 10U << 16) << pixel;
+  }
+}
+
 }  // namespace
 }  // namespace frontier_surfels

@@ -146,7 +146,7 @@ void BandSampler::sample_row(int t, SampledDepth& sampled) {
       mean = agree + nearer + farther < least ? 0 : sampling_.fill(rows_, s, t, &pivot);
     }
     sampled.means[n] = mean;
-    sampled.whole[n] = agree == edge * edge ? 1 : 0;
+    sampled.whole[n] = agree == edge * edge && !std::isinf(pivot) ? 1 : 0;  // with +Inf also the blank pixels beside the image agree
     sampled.pivots[n] = mean > 0 && std::isfinite(mean) ? pivot : 0;
   }
 }
