@@ -44,14 +44,14 @@ void read_row_as(const std::uint8_t* bytes, int width, double depth_unit, const 
 
 /// Writes meaning(depth [m]) of each pixel of a row to values[image.width]. What is the same for all pixels is decided before the loop over
 /// them, so that the compiler makes vectors of it.
-template <typename Meaning>
+/// @tparam Pixel  unsigned integer of the image's pixel size
+template <typename Pixel, typename Meaning>
 void read_row(const DepthImage& image, int row, double depth_unit, const Meaning& meaning, float* values) {
   const auto* bytes = static_cast<const std::uint8_t*>(image.data) + row * image.step;
-  const bool in_steps = image.encoding == DepthImage::Encoding::kStepsU16;
-  if (in_steps && !image.swap_bytes) read_row_as<std::uint16_t, false>(bytes, image.width, depth_unit, meaning, values);
-  if (in_steps && image.swap_bytes) read_row_as<std::uint16_t, true>(bytes, image.width, depth_unit, meaning, values);
-  if (!in_steps && !image.swap_bytes) read_row_as<std::uint32_t, false>(bytes, image.width, depth_unit, meaning, values);
-  if (!in_steps && image.swap_bytes) read_row_as<std::uint32_t, true>(bytes, image.width, depth_unit, meaning, values);
+  if (image.swap_bytes)
+    read_row_as<Pixel, true>(bytes, image.width, depth_unit, meaning, values);
+  else
+    read_row_as<Pixel, false>(bytes, image.width, depth_unit, meaning, values);
 }
 
 /// Calls visit(pixel) for the upper left pixel of every whole block of decimation x decimation pixels, row by row.

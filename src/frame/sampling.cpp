@@ -23,13 +23,26 @@ unsigned sides_of(int dx, int dy) {
 }
 constexpr unsigned kAllSides = 0xff;
 
-/// Deals the pixels of a row out to planes[kPlanes][stride]: one to each in turn. @return number of the pixels dealt
-template <int kPlanes>
-int deal(const float* row, int width, int stride, float* planes) {
-  const int each = width / kPlanes;
-  for (int plane = 0; plane < kPlanes; ++plane)
-    for (int s = 0; s < each; ++s) planes[plane * stride + s] = row[kPlanes * s + plane];
-  return each * kPlanes;
+/// Deals the pixels of a row out to four planes, one to each in turn. @return number of the pixels dealt
+int deal_to_four(const float* row, int width, int stride, float* planes) {
+  float* __restrict__ first = planes, * __restrict__ second = first + stride, * __restrict__ third = second + stride, * __restrict__ fourth = third + stride;
+  for (int s = 0; s < width / 4; ++s) {
+    first[s] = row[4 * s];
+    second[s] = row[4 * s + 1];
+    third[s] = row[4 * s + 2];
+    fourth[s] = row[4 * s + 3];
+  }
+  return width / 4 * 4;
+}
+
+/// As deal_to_four().
+int deal_to_two(const float* row, int width, int stride, float* planes) {
+  float* __restrict__ first = planes, * __restrict__ second = first + stride;
+  for (int s = 0; s < width / 2; ++s) {
+    first[s] = row[2 * s];
+    second[s] = row[2 * s + 1];
+  }
+  return width / 2 * 2;
 }
 
 /// Counts kColumns pixels of each block, which lie side by side. depth[n][s] is the n-th of block s; see BandSampler for the other arrays.
@@ -65,7 +78,7 @@ DepthRows::DepthRows(const DepthImage& image, const Config& config, int margin)
 void DepthRows::move_to(int t) {
   const int middle = decimation_ * t;
   for (next_ = std::max(next_, middle - margin_); next_ <= middle + margin_; ++next_) {
-    float* planes = planes_of(next_);
+    float* planes = &depth_[first_of(next_)];
     if (next_ < 0 || next_ >= image_.height)
       std::fill(planes, planes + static_cast<std::ptrdiff_t>(decimation_) * stride_, 0.0F);
     else
@@ -73,18 +86,24 @@ void DepthRows::move_to(int t) {
   }
 }
 
-/// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are.
+/// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are. The common decimations have loops of their
+/// own, of which the compiler makes vectors.
 void DepthRows::read(int row, float* planes) {
-  const auto meaning = [no_return = no_return_, far = far_](float raw) {
+  const auto of_float = [no_return = no_return_, far = far_](float raw) {
     const float depth = raw == std::numeric_limits<float>::infinity() ? no_return : std::min(raw, far);
     return raw > 0 ? depth : 0;
   };
-  read_row(image_, row, depth_unit_, meaning, of_row_.data());
+  const auto of_steps = [far = far_](float raw) { return std::min(raw, far); };  // never negative or infinite
+  if (image_.encoding == DepthImage::Encoding::kStepsU16)
+    read_row<std::uint16_t>(image_, row, depth_unit_, of_steps, of_row_.data());
+  else
+    read_row<std::uint32_t>(image_, row, depth_unit_, of_float, of_row_.data());
   float* first = planes + 1;
   int column = 0;
-  if (decimation_ == 2) column = deal<2>(of_row_.data(), image_.width, stride_, first);
-  if (decimation_ == 4) column = deal<4>(of_row_.data(), image_.width, stride_, first);
-  for (; column < image_.width; ++column) first[column % decimation_ * stride_ + column / decimation_] = of_row_[column];
+  if (decimation_ == 2) column = deal_to_two(of_row_.data(), image_.width, stride_, first);
+  if (decimation_ == 4) column = deal_to_four(of_row_.data(), image_.width, stride_, first);
+  for (int s = column / decimation_; column < image_.width; ++s)
+    for (int plane = 0; plane < decimation_ && column < image_.width; ++plane, ++column) first[plane * stride_ + s] = of_row_[column];
 }
 
 Sampling::Sampling(const Config& config)
@@ -128,7 +147,7 @@ void BandSampler::count(int t) {
     count_columns(depth, width, lowest_.data(), highest_.data(), sum_.data(), agree_.data(), farther_.data(), measured_.data());
   };
   for (int row = sampling_.config_.decimation * t - radius, last = row + 2 * radius; row <= last; ++row) {
-    const auto every = [&](int dx) { return rows_.every(dx, row); };
+    const auto every = [&, planes = rows_.planes_of(row)](int dx) { return planes + rows_.offset_of(dx); };
     int dx = -radius;
     for (; dx + 4 <= radius; dx += 5)
       add(std::array<const float*, 5>{every(dx), every(dx + 1), every(dx + 2), every(dx + 3), every(dx + 4)});

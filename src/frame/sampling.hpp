@@ -49,14 +49,15 @@ class DepthRows {
   void move_to(int t);  ///< reads the rows of block row t, which must not lie above those of the last call
 
   /// Pixels column, column + decimation, column + 2 decimation ... of a row. @param column  -margin ... decimation - 1
-  const float* every(int column, int row) const {
-    const float* planes = &depth_[static_cast<std::size_t>((row + margin_) % rows_) * decimation_ * stride_];
-    return column < 0 ? &planes[(column + decimation_) * stride_] : &planes[column * stride_ + 1];
-  }
+  const float* every(int column, int row) const { return planes_of(row) + offset_of(column); }
+
+  const float* planes_of(int row) const { return &depth_[first_of(row)]; }
+  /// From the planes of a row to every(column, row).
+  std::ptrdiff_t offset_of(int column) const { return column < 0 ? (column + decimation_) * stride_ : column * stride_ + 1; }
 
  private:
   void read(int row, float* planes);
-  float* planes_of(int row) { return &depth_[static_cast<std::size_t>((row + margin_) % rows_) * decimation_ * stride_]; }
+  std::size_t first_of(int row) const { return static_cast<std::size_t>((row + margin_) % rows_) * decimation_ * stride_; }
 
   const DepthImage& image_;
   double depth_unit_;
@@ -86,8 +87,10 @@ class Sampling {
   /// Calls visit(depth, dx, dy) for each pixel of block (s, t), row by row. @param visit  dx, dy: from the middle
   template <typename Visit>
   void for_each_pixel_of(const DepthRows& rows, int s, int t, Visit visit) const {
-    for (int dy = -radius_; dy <= radius_; ++dy)
-      for (int dx = -radius_; dx <= radius_; ++dx) visit(rows.every(dx, config_.decimation * t + dy)[s], dx, dy);
+    for (int dy = -radius_; dy <= radius_; ++dy) {
+      const float* planes = rows.planes_of(config_.decimation * t + dy) + s;
+      for (int dx = -radius_; dx <= radius_; ++dx) visit(planes[rows.offset_of(dx)], dx, dy);
+    }
   }
 
   int radius() const { return radius_; }  ///< a block has 2 radius + 1 pixels along each edge

@@ -69,7 +69,11 @@ std::vector<float> read_depth(const DepthImage& image, const Config& config) {
   std::vector<float> depth(static_cast<std::size_t>(width) * height), of_row(step == 1 ? 0 : image.width);
   for (int t = 0; t < height; ++t) {
     float* row = &depth[static_cast<std::size_t>(t) * width];
-    read_row(image, t * step, config.depth_unit, meaning, step == 1 ? row : of_row.data());
+    float* to = step == 1 ? row : of_row.data();
+    if (image.encoding == DepthImage::Encoding::kStepsU16)
+      read_row<std::uint16_t>(image, t * step, config.depth_unit, meaning, to);
+    else
+      read_row<std::uint32_t>(image, t * step, config.depth_unit, meaning, to);
     if (step == 1) continue;
     for (int s = 0; s < width; ++s) row[s] = of_row[static_cast<std::size_t>(s) * step];
   }
