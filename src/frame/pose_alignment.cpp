@@ -285,13 +285,13 @@ Motion solve(const Sums& sums, const Motion& recorded) {
 
 }  // namespace
 
-std::vector<float> inverse_depths(const WorkingImage& image) {
-  std::vector<float> inverse(image.depth.size());
-  std::transform(image.depth.begin(), image.depth.end(), inverse.begin(), [](float depth) {
+std::vector<float> inverse_depths(const WorkingImage& image, std::vector<float> room) {
+  room.resize(image.depth.size());
+  std::transform(image.depth.begin(), image.depth.end(), room.begin(), [](float depth) {
     const float inverse_depth = 1 / depth;
     return depth > 0 ? inverse_depth : 0;
   });
-  return inverse;
+  return room;
 }
 
 /// Without sines, whose last bits are not the same on all machines.
