@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "frame/depth_pixels.hpp"
 
@@ -49,15 +50,22 @@ int deal_to_two(const float* row, int width, int stride, float* planes) {
 template <std::size_t kColumns>
 void count_columns(const std::array<const float*, kColumns>& depth, int width, const float* lowest, const float* highest,
                    float* __restrict__ sum, int* __restrict__ agree, int* __restrict__ farther, int* __restrict__ measured) {
-  for (int s = 0; s < width; ++s)
+  for (int s = 0; s < width; ++s) {
+    const float low = lowest[s], high = highest[s];
+    float total = sum[s];
+    std::array<int, kColumns> agrees, is_far, is_measured;
     for (std::size_t n = 0; n < kColumns; ++n) {
       const float d = depth[n][s];
-      const int is_far = d > highest[s] ? 1 : 0, is_near = d < lowest[s] ? 1 : 0, agrees = 1 - (is_far | is_near);
-      sum[s] += agrees != 0 ? d : 0;
-      agree[s] += agrees;
-      farther[s] += is_far;
-      measured[s] += d > 0 ? 1 : 0;
+      is_far[n] = d > high ? 1 : 0;
+      agrees[n] = 1 - (is_far[n] | (d < low ? 1 : 0));
+      is_measured[n] = d > 0 ? 1 : 0;
+      total += agrees[n] != 0 ? d : 0;
     }
+    sum[s] = total;
+    agree[s] += std::accumulate(agrees.begin(), agrees.end(), 0);
+    farther[s] += std::accumulate(is_far.begin(), is_far.end(), 0);
+    measured[s] += std::accumulate(is_measured.begin(), is_measured.end(), 0);
+  }
 }
 
 }  // namespace
