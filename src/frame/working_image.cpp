@@ -192,7 +192,8 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
   const Sampling sampling(config);
   SampledDepth sampled(static_cast<std::size_t>(width) * height);
   if (frame.color) image.color.resize(sampled.means.size());
-  in_row_bands(height, config.threads, [&](int first, int last) {
+  const std::size_t pixels = static_cast<std::size_t>(frame.depth.width) * frame.depth.height;
+  in_row_bands(height, frame.color ? 2 * pixels : pixels, config.threads, [&](int first, int last) {
     BandSampler band(sampling, frame.depth, width);
     std::optional<MeanColors> colors;
     if (frame.color) colors.emplace(*frame.color, band.rows(), sampling, config);
