@@ -50,6 +50,13 @@ std::vector<ReferenceFrame> references_of(const Frames& frames) {
   return references;
 }
 
+TEST(PoseAlignment, InverseDepthsAreOfSurfacesAlone) {
+  const WorkingImage image = {plain_camera(5, 1, 100), {2, 0, -3, 0.5F, 3}, {}};
+  const std::vector<float> expected = {0.5F, 0, 0, 2, 1.0F / 3};
+  EXPECT_EQ(inverse_depths(image), expected);
+  EXPECT_EQ(inverse_depths(image, std::vector<float>(9, 7.0F)), expected);
+}
+
 TEST(PoseAlignment, AMotionLeadsFromOnePoseToTheOther) {
   RandomJitter jitter(0.3, 0.4);
   for (int n = 0; n < 50; ++n) {

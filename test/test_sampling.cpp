@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <iterator>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "frame/working_image.hpp"
@@ -73,6 +77,79 @@ TEST(Sampling, IsThatOfTheYardsticks) {
     ASSERT_EQ(working.depth.size(), expected.depth.size());
     for (std::size_t pixel = 0; pixel < working.depth.size(); ++pixel)
       ASSERT_EQ(working.depth[pixel], expected.depth[pixel]) << "image " << n << ", pixel " << pixel;
+  }
+}
+
+void expect_equal(const WorkingImage& image, const WorkingImage& expected) {
+  EXPECT_EQ(image.depth, expected.depth);
+  EXPECT_EQ(image.color, expected.color);
+  const auto zeros = static_cast<std::size_t>(std::count(expected.depth.begin(), expected.depth.end(), 0.0F));
+  EXPECT_EQ(image.measured_pixels(), expected.depth.size() - zeros);
+}
+
+/// The pixels of an image as bytes.
+struct Bytes {
+  std::vector<std::uint8_t> bytes;
+
+  template <typename Pixel>
+  void add(Pixel pixel, bool swap) {
+    std::uint8_t of_pixel[sizeof(Pixel)];
+    std::memcpy(of_pixel, &pixel, sizeof(Pixel));
+    if (swap) std::reverse(std::begin(of_pixel), std::end(of_pixel));
+    bytes.insert(bytes.end(), std::begin(of_pixel), std::end(of_pixel));
+  }
+};
+
+/// Whole steps as such and in metres, in either order of bytes, at odd addresses, in rows with a rest.
+TEST(Sampling, HowDepthsAreWrittenMakesNoDifference) {
+  std::mt19937 rng(8);
+  for (int n = 0; n < 60; ++n) {
+    Config config = config_for(1 + n % 6);
+    config.sampling = n % 5 == 0 ? "nearest" : "mean";
+    config.carve_beyond_range = n % 2 == 0;
+    Image image(30 + n, 25 + n % 7, 0);
+    std::vector<std::uint16_t> steps;
+    for (float& depth : image.depth) {
+      const auto kind = rng() % 8;
+      steps.push_back(static_cast<std::uint16_t>(kind == 0 ? 0 : kind == 1 ? 65535 : kind == 2 ? rng() % 9000 : 1200 + rng() % 40));
+      depth = steps.back() == 65535 ? 0 : static_cast<float>(steps.back() * config.depth_unit);
+    }
+    const WorkingImage expected = image.working(config);
+    for (const bool swap : {false, true})
+      for (const bool in_steps : {false, true}) {
+        Bytes all;
+        all.bytes.resize(1);
+        DepthFrame frame = image.frame();
+        for (std::size_t pixel = 0; pixel < steps.size(); ++pixel) {
+          if (in_steps)
+            all.add(steps[pixel], swap);
+          else
+            all.add(image.depth[pixel], swap);
+          if ((pixel + 1) % static_cast<std::size_t>(image.width) == 0) all.bytes.insert(all.bytes.end(), 3, 99);
+        }
+        frame.depth.encoding = in_steps ? DepthImage::Encoding::kStepsU16 : DepthImage::Encoding::kMetresF32;
+        frame.depth.step = image.width * (in_steps ? sizeof(std::uint16_t) : sizeof(float)) + 3;
+        frame.depth.swap_bytes = swap;
+        frame.depth.data = &all.bytes[1];
+        SCOPED_TRACE("image " + std::to_string(n) + (swap ? ", swapped" : "") + (in_steps ? ", in steps" : ", in metres"));
+        expect_equal(make_working_image(frame, config, kVoxels), expected);
+      }
+  }
+}
+
+/// The image is large enough for several bands of rows.
+TEST(Sampling, ThreadsMakeNoDifference) {
+  std::mt19937 rng(9);
+  for (const int decimation : {2, 3, 4, 5}) {
+    Config config = config_for(decimation);
+    Image image = random_image(801, 603, rng);
+    for (std::size_t byte = 0; byte < 3 * image.depth.size(); ++byte) image.color.push_back(static_cast<std::uint8_t>(rng()));
+    config.threads = 1;
+    const WorkingImage expected = image.working(config);
+    for (const int threads : {2, 3, 0}) {
+      config.threads = threads;
+      expect_equal(image.working(config), expected);
+    }
   }
 }
 
@@ -211,6 +288,20 @@ TEST(Sampling, ColoursAreThoseOfTheSameSurface) {
   const WorkingImage working = image.working(config_for(4));
   EXPECT_EQ(working.color[5 * 10 + 5], 101U | 7U << 8 | 9U << 16);  // rows 18 to 22: 100, 102, 100, 102, 100
   EXPECT_EQ(working.color[5 * 10 + 6], 0U | 255U << 8 | 9U << 16);
+}
+
+/// Also at the image's edges, beside which there are no colours.
+TEST(Sampling, NothingWithinRangeHasTheMiddlePixelsColour) {
+  Image image(40, 40, std::numeric_limits<float>::infinity());
+  for (int row = 0; row < 40; ++row)
+    for (int column = 0; column < 40; ++column) image.color.insert(image.color.end(), 3, row % 4 == 0 && column % 4 == 0 ? 10 : 200);
+  Config config = config_for(4);
+  config.carve_no_return = true;
+  const WorkingImage working = image.working(config);
+  for (std::size_t pixel = 0; pixel < working.depth.size(); ++pixel) {
+    ASSERT_EQ(working.depth[pixel], -3);
+    ASSERT_EQ(working.color[pixel], 10U | 10U << 8 | 10U << 16) << pixel;
+  }
 }
 
 }  // namespace

@@ -15,7 +15,10 @@ inline std::uint16_t swapped(std::uint16_t value) { return __builtin_bswap16(val
 inline std::uint32_t swapped(std::uint32_t value) { return __builtin_bswap32(value); }
 
 /// Depth of a 16-bit pixel [m]; 0: no measurement. @param depth_unit  Config::depth_unit
-inline float to_metres(std::uint16_t steps, double depth_unit) { return steps == kSaturated ? 0 : static_cast<float>(steps * depth_unit); }
+inline float to_metres(std::uint16_t steps, double depth_unit) {
+  const std::uint16_t measured = steps == kSaturated ? 0 : steps;  // chosen among 16 bits: vectors hold more of them
+  return static_cast<float>(measured * depth_unit);
+}
 
 /// Depth of a pixel whose bits are a float [m].
 inline float to_metres(std::uint32_t bits, double /*depth_unit*/) {
@@ -30,6 +33,25 @@ Pixel pixel_at(const std::uint8_t* bytes, bool swap_bytes) {
   Pixel pixel;
   std::memcpy(&pixel, bytes, sizeof(pixel));
   return swap_bytes ? swapped(pixel) : pixel;
+}
+
+/// See read_row().
+template <typename Pixel, bool kSwapBytes, typename Meaning>
+void read_row_as(const std::uint8_t* bytes, int width, double depth_unit, const Meaning meaning, float* __restrict__ values) {
+  for (int column = 0; column < width; ++column)
+    values[column] = meaning(to_metres(pixel_at<Pixel>(bytes + column * sizeof(Pixel), kSwapBytes), depth_unit));
+}
+
+/// Writes meaning(depth [m]) of each pixel of a row to values[image.width]. What is the same for all pixels is decided before the loop over
+/// them, so that the compiler makes vectors of it.
+/// @tparam Pixel  unsigned integer of the image's pixel size
+template <typename Pixel, typename Meaning>
+void read_row(const DepthImage& image, int row, double depth_unit, const Meaning& meaning, float* values) {
+  const auto* bytes = static_cast<const std::uint8_t*>(image.data) + row * image.step;
+  if (image.swap_bytes)
+    read_row_as<Pixel, true>(bytes, image.width, depth_unit, meaning, values);
+  else
+    read_row_as<Pixel, false>(bytes, image.width, depth_unit, meaning, values);
 }
 
 /// Calls visit(pixel) for the upper left pixel of every whole block of decimation x decimation pixels, row by row.

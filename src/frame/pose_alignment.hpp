@@ -17,7 +17,8 @@ struct ReferenceFrame {
 };
 
 /// The inverse depths of an image, in the format of ReferenceFrame.
-std::vector<float> inverse_depths(const WorkingImage& image);
+/// @param room  no longer needed, so that its memory can be used: new memory of the size of an image costs more than its contents
+std::vector<float> inverse_depths(const WorkingImage& image, std::vector<float> room = {});
 
 /// A small motion in the world: a shift [m], and a turn about a centre. The turn is 2 tan(angle / 2) times its axis, which for small
 /// angles is the rotation vector [rad].

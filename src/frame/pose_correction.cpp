@@ -1,6 +1,8 @@
 #include "frame/pose_correction.hpp"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 namespace frontier_surfels {
 namespace {
@@ -69,8 +71,12 @@ CorrectedPose PoseCorrection::correct(const WorkingImage& image, const Eigen::Is
 void PoseCorrection::add(const WorkingImage& image, const CorrectedPose& pose) {
   if (!config_.correct_poses) return;
   History& history = histories_.use(image.intrinsics, image.intrinsics);
-  history.last.push_front({pose.T_world_camera, inverse_depths(image)});
-  if (history.last.size() > kFrames) history.last.pop_back();
+  std::vector<float> room;
+  if (history.last.size() == kFrames) {
+    room = std::move(history.last.back().inverse_depth);
+    history.last.pop_back();
+  }
+  history.last.push_front({pose.T_world_camera, inverse_depths(image, std::move(room))});
   history.deviations = pose.deviations;
   ++history.frames;
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numeric>
 
 #include "frontier_surfels/number_text.hpp"
 
@@ -12,25 +11,9 @@ namespace frontier_surfels {
 namespace {
 
 /// A depth in steps, rounded down, so that nothing counts as seen that was not. z_max may be one step more than 16 bits hold.
-cl_ushort to_steps(float depth, float per_step) { return static_cast<cl_ushort>(std::min(std::abs(depth) * per_step, 65535.0F)); }
-
-/// Largest or smallest depth in each block of VIEW_BLOCK x VIEW_BLOCK pixels.
-/// @param choose  std::max or std::min
-template <typename Choose>
-std::vector<float> find_block_depths(const WorkingImage& image, Choose choose) {
-  const int width = image.intrinsics.width, height = image.intrinsics.height;
-  std::vector<float> blocks;
-  for (int row = 0; row < height; row += VIEW_BLOCK) {
-    std::vector<float> of_columns(width);
-    for (int t = row; t < std::min(row + VIEW_BLOCK, height); ++t) {
-      const float* depth = &image.depth[static_cast<std::size_t>(t) * width];
-      for (int s = 0; s < width; ++s) of_columns[s] = t == row ? std::abs(depth[s]) : choose(of_columns[s], std::abs(depth[s]));
-    }
-    for (int column = 0; column < width; column += VIEW_BLOCK)
-      blocks.push_back(
-          std::accumulate(&of_columns[column], &of_columns[0] + std::min(column + VIEW_BLOCK, width), of_columns[column], choose));
-  }
-  return blocks;
+cl_ushort to_steps(float depth, float per_step) {
+  const float steps = std::abs(depth) * per_step;
+  return static_cast<cl_ushort>(steps < 65535.0F ? steps : 65535.0F);
 }
 
 constexpr int kPatch = PATCH_COLUMNS * PATCH_ROWS;
@@ -45,19 +28,79 @@ std::size_t room_for(int width, int height) {
   return (depths + of_blocks + kPatch - 1) / kPatch * kPatch;
 }
 
-/// A view's depths in the kernels' layout: patch by patch, in steps, without signs. Pixels beyond the image's edges are 0.
-std::vector<cl_ushort> by_patches(const WorkingImage& image, float per_step) {
-  const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS);
-  std::vector<cl_ushort> depths(static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch, 0);
-  for (int t = 0; t < height; ++t) {
-    const float* from = &image.depth[static_cast<std::size_t>(t) * width];
-    cl_ushort* to = &depths[static_cast<std::size_t>(t / PATCH_ROWS) * columns * kPatch + t % PATCH_ROWS * PATCH_COLUMNS];
-    int s = 0;
-    for (; s + PATCH_COLUMNS <= width; s += PATCH_COLUMNS, to += kPatch)
-      for (int n = 0; n < PATCH_COLUMNS; ++n) to[n] = to_steps(from[s + n], per_step);
-    for (int n = 0; s + n < width; ++n) to[n] = to_steps(from[s + n], per_step);
+/// Writes a row of an image, in steps, into its patches, which are kPatch elements apart.
+void write_row(const float* depth, int width, float per_step, cl_ushort* patch) {
+  int s = 0;
+  for (; s + PATCH_COLUMNS <= width; s += PATCH_COLUMNS, patch += kPatch)
+    for (int n = 0; n < PATCH_COLUMNS; ++n) patch[n] = to_steps(depth[s + n], per_step);
+  for (int n = 0; s + n < width; ++n) patch[n] = to_steps(depth[s + n], per_step);
+}
+
+/// Largest and smallest depth of each column of a row of blocks.
+class Extremes {
+ public:
+  explicit Extremes(int width) : width_(width), largest_(patches(width, VIEW_BLOCK) * VIEW_BLOCK), smallest_(largest_.size()) {}
+
+  void clear() {
+    std::fill(largest_.begin(), largest_.end(), 0.0F);
+    std::fill(smallest_.begin(), smallest_.end(), std::numeric_limits<float>::infinity());
   }
-  return depths;
+
+  void add_row(const float* depth) {
+    float* __restrict__ largest = largest_.data(), * __restrict__ smallest = smallest_.data();
+    for (int s = 0; s < width_; ++s) {
+      const float d = std::abs(depth[s]);
+      largest[s] = std::max(largest[s], d);
+      smallest[s] = std::min(smallest[s], d);
+    }
+  }
+
+  /// Those of the blocks, in steps. @return the largest of all [m]
+  float write_blocks(float per_step, cl_ushort* largest, cl_ushort* smallest) const {
+    float deepest = 0;
+    for (std::size_t column = 0; column < largest_.size(); column += VIEW_BLOCK) {
+      float high = largest_[column], low = smallest_[column];
+      for (std::size_t n = column + 1; n < column + VIEW_BLOCK; ++n) {
+        high = std::max(high, largest_[n]);
+        low = std::min(low, smallest_[n]);
+      }
+      *largest++ = to_steps(high, per_step);
+      *smallest++ = to_steps(low, per_step);
+      deepest = std::max(deepest, high);
+    }
+    return deepest;
+  }
+
+ private:
+  int width_;
+  std::vector<float> largest_, smallest_;
+};
+
+/// A view's depths in the kernels' layout: patch by patch, in steps, without signs, then the largest and the smallest ones of the blocks.
+/// Pixels beyond the image's edges are 0.
+struct KeptDepths {
+  std::vector<cl_ushort> depths;  ///< of a room
+  float deepest = 0;              ///< [m]
+};
+
+KeptDepths kept_depths(const WorkingImage& image, float per_step) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS),
+            across = patches(width, VIEW_BLOCK);
+  KeptDepths kept = {std::vector<cl_ushort>(room_for(width, height)), 0};
+  cl_ushort* largest = &kept.depths[static_cast<std::size_t>(columns) * patches(height, PATCH_ROWS) * kPatch];
+  cl_ushort* smallest = largest + static_cast<std::ptrdiff_t>(across) * patches(height, VIEW_BLOCK);
+  Extremes extremes(width);
+  for (int first = 0; first < height; first += VIEW_BLOCK, largest += across, smallest += across) {
+    extremes.clear();
+    for (int t = first; t < std::min(first + VIEW_BLOCK, height); ++t) {
+      const float* depth = &image.depth[static_cast<std::size_t>(t) * width];
+      write_row(depth, width, per_step,
+                &kept.depths[static_cast<std::size_t>(t / PATCH_ROWS) * columns * kPatch + t % PATCH_ROWS * PATCH_COLUMNS]);
+      extremes.add_row(depth);
+    }
+    kept.deepest = std::max(kept.deepest, extremes.write_blocks(per_step, largest, smallest));
+  }
+  return kept;
 }
 
 Transform to_transform(const Eigen::Matrix<double, 3, 4>& matrix) {
@@ -124,17 +167,11 @@ void RecentViews::clear(bool map_is_empty) {
 }
 
 void RecentViews::set_current(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
-  const auto per_step = static_cast<float>(1 / depth_step_);
-  std::vector<cl_ushort> depths = by_patches(image, per_step);
-  const std::vector<float> largest = find_block_depths(image, [](float a, float b) { return std::max(a, b); }),
-                           smallest = find_block_depths(image, [](float a, float b) { return std::min(a, b); });
-  for (const float depth : largest) depths.push_back(to_steps(depth, per_step));
-  for (const float depth : smallest) depths.push_back(to_steps(depth, per_step));
-  depths.resize(room_for(image.intrinsics.width, image.intrinsics.height));
-  if (depths.size() > room_size_) enlarge_rooms(depths.size());
-  current_ = {image.intrinsics, T_world_camera, free_room(), *std::max_element(largest.begin(), largest.end()), ++last_number_};
+  KeptDepths kept = kept_depths(image, static_cast<float>(1 / depth_step_));
+  if (kept.depths.size() > room_size_) enlarge_rooms(kept.depths.size());
+  current_ = {image.intrinsics, T_world_camera, free_room(), kept.deepest, ++last_number_};
   forgotten_.reset();
-  depths_.send(std::move(depths), current_.room * room_size_);
+  depths_.send(std::move(kept.depths), current_.room * room_size_);
 }
 
 void RecentViews::make_room(const std::vector<SavedView>& views) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <future>
 #include <system_error>
 #include <vector>
@@ -11,11 +12,17 @@
 namespace frontier_surfels {
 
 /// Calls work(first, last) for bands of rows, first ... last - 1, that make up all rows, on `threads` threads, the calling one among them.
-/// An exception of any of them is thrown again here. @param threads  Config::threads
+/// An exception of any of them is thrown again here.
+/// @param values   numbers that are read for all rows together
+/// @param threads  Config::threads
 template <typename Work>
-void in_row_bands(int rows, int threads, Work work) {
-  constexpr int kMostThreads = 8, kLeastRows = 16;  // more threads would take longer to start than they save
-  const int bands = std::clamp(std::min(threads_of_host(threads), rows / kLeastRows), 1, kMostThreads);
+void in_row_bands(int rows, std::size_t values, int threads, Work work) {
+  // To start a thread takes 25 to 50 us, one after the other. So many values take about four times as long: a smaller band would not be
+  // worth a thread.
+  constexpr std::size_t kLeastValues = 100000;
+  constexpr int kMostThreads = 8, kLeastRows = 16;
+  const int worth = static_cast<int>(std::min<std::size_t>(values / kLeastValues, kMostThreads));
+  const int bands = std::max(1, std::min({threads_of_host(threads), rows / kLeastRows, worth}));
   const auto begin = [&](int band) { return static_cast<int>(static_cast<long>(rows) * band / bands); };
   std::vector<std::future<void>> others;
   int band = 1;

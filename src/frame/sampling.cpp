@@ -1,8 +1,10 @@
 #include "frame/sampling.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "frame/depth_pixels.hpp"
 
@@ -22,14 +24,51 @@ unsigned sides_of(int dx, int dy) {
 }
 constexpr unsigned kAllSides = 0xff;
 
-}  // namespace
-
-float interpret(float d, const Config& config) {
-  const float z_max = static_cast<float>(config.z_max);
-  if (std::isnan(d) || d < static_cast<float>(config.z_min)) return 0;
-  if (d <= z_max) return d;
-  return (std::isinf(d) ? config.carve_no_return : config.carve_beyond_range) ? -z_max : 0;
+/// Deals the pixels of a row out to four planes, one to each in turn. @return number of the pixels dealt
+int deal_to_four(const float* row, int width, int stride, float* planes) {
+  float* __restrict__ first = planes, * __restrict__ second = first + stride, * __restrict__ third = second + stride, * __restrict__ fourth = third + stride;
+  for (int s = 0; s < width / 4; ++s) {
+    first[s] = row[4 * s];
+    second[s] = row[4 * s + 1];
+    third[s] = row[4 * s + 2];
+    fourth[s] = row[4 * s + 3];
+  }
+  return width / 4 * 4;
 }
+
+/// As deal_to_four().
+int deal_to_two(const float* row, int width, int stride, float* planes) {
+  float* __restrict__ first = planes, * __restrict__ second = first + stride;
+  for (int s = 0; s < width / 2; ++s) {
+    first[s] = row[2 * s];
+    second[s] = row[2 * s + 1];
+  }
+  return width / 2 * 2;
+}
+
+/// Counts kColumns pixels of each block, which lie side by side. depth[n][s] is the n-th of block s; see BandSampler for the other arrays.
+template <std::size_t kColumns>
+void count_columns(const std::array<const float*, kColumns>& depth, int width, const float* lowest, const float* highest,
+                   float* __restrict__ sum, int* __restrict__ agree, int* __restrict__ farther, int* __restrict__ measured) {
+  for (int s = 0; s < width; ++s) {
+    const float low = lowest[s], high = highest[s];
+    float total = sum[s];
+    std::array<int, kColumns> agrees, is_far, is_measured;
+    for (std::size_t n = 0; n < kColumns; ++n) {
+      const float d = depth[n][s];
+      is_far[n] = d > high ? 1 : 0;
+      agrees[n] = 1 - (is_far[n] | (d < low ? 1 : 0));
+      is_measured[n] = d > 0 ? 1 : 0;
+      total += agrees[n] != 0 ? d : 0;
+    }
+    sum[s] = total;
+    agree[s] += std::accumulate(agrees.begin(), agrees.end(), 0);
+    farther[s] += std::accumulate(is_far.begin(), is_far.end(), 0);
+    measured[s] += std::accumulate(is_measured.begin(), is_measured.end(), 0);
+  }
+}
+
+}  // namespace
 
 DepthRows::DepthRows(const DepthImage& image, const Config& config, int margin)
     : image_(image),
@@ -47,39 +86,32 @@ DepthRows::DepthRows(const DepthImage& image, const Config& config, int margin)
 void DepthRows::move_to(int t) {
   const int middle = decimation_ * t;
   for (next_ = std::max(next_, middle - margin_); next_ <= middle + margin_; ++next_) {
-    float* planes = planes_of(next_);
+    float* planes = &depth_[first_of(next_)];
     if (next_ < 0 || next_ >= image_.height)
       std::fill(planes, planes + static_cast<std::ptrdiff_t>(decimation_) * stride_, 0.0F);
-    else if (image_.encoding == DepthImage::Encoding::kStepsU16)
-      read<std::uint16_t>(next_, planes);
     else
-      read<std::uint32_t>(next_, planes);
+      read(next_, planes);
   }
 }
 
-/// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are.
-template <typename Pixel>
+/// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are. The common decimations have loops of their
+/// own, of which the compiler makes vectors.
 void DepthRows::read(int row, float* planes) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const auto* pixels = static_cast<const std::uint8_t*>(image_.data) + row * image_.step;
-  for (int column = 0; column < image_.width; ++column) {
-    const float raw = to_metres(pixel_at<Pixel>(pixels + column * sizeof(Pixel), image_.swap_bytes), depth_unit_),
-                finite = std::min(raw, far_);
-    of_row_[column] = raw > 0 ? (raw == kInfinity ? no_return_ : finite) : 0;
-  }
-  for (int first = 0; first < decimation_; ++first) {
-    float* to = &planes[first * stride_ + 1];
-    for (int column = first; column < image_.width; column += decimation_) *to++ = of_row_[column];
-  }
-}
-
-const float* DepthRows::every(int column, int row) const {
-  const int plane = (column + decimation_) % decimation_, first = column < 0 ? 0 : 1;
-  return &depth_[(static_cast<std::size_t>((row + margin_) % rows_) * decimation_ + plane) * stride_ + first];
-}
-
-float DepthRows::at(int column, int row) const {
-  return column < 0 ? *every(column, row) : every(column % decimation_, row)[column / decimation_];
+  const auto of_float = [no_return = no_return_, far = far_](float raw) {
+    const float depth = raw == std::numeric_limits<float>::infinity() ? no_return : std::min(raw, far);
+    return raw > 0 ? depth : 0;
+  };
+  const auto of_steps = [far = far_](float raw) { return std::min(raw, far); };  // never negative or infinite
+  if (image_.encoding == DepthImage::Encoding::kStepsU16)
+    read_row<std::uint16_t>(image_, row, depth_unit_, of_steps, of_row_.data());
+  else
+    read_row<std::uint32_t>(image_, row, depth_unit_, of_float, of_row_.data());
+  float* first = planes + 1;
+  int column = 0;
+  if (decimation_ == 2) column = deal_to_two(of_row_.data(), image_.width, stride_, first);
+  if (decimation_ == 4) column = deal_to_four(of_row_.data(), image_.width, stride_, first);
+  for (int s = column / decimation_; column < image_.width; ++s)
+    for (int plane = 0; plane < decimation_ && column < image_.width; ++plane, ++column) first[plane * stride_ + s] = of_row_[column];
 }
 
 Sampling::Sampling(const Config& config)
@@ -90,9 +122,6 @@ Sampling::Sampling(const Config& config)
       constant_(static_cast<float>(kSigmas * config.noise)),
       growth_(static_cast<float>(kSigmas * config.noise_growth + config.quantisation)) {}
 
-float Sampling::tolerance(float depth) const { return std::max(agreement_ * depth, constant_ + growth_ * depth * depth); }
-float Sampling::lowest(float pivot) const { return std::max(pivot - tolerance(pivot), std::numeric_limits<float>::min()); }
-
 BandSampler::BandSampler(const Sampling& sampling, const DepthImage& image, int width)
     : sampling_(sampling),
       rows_(image, sampling.config_, sampling.radius_),
@@ -100,54 +129,80 @@ BandSampler::BandSampler(const Sampling& sampling, const DepthImage& image, int 
       highest_(width),
       sum_(width),
       agree_(width),
-      nearer_(width),
-      farther_(width) {}
+      farther_(width),
+      measured_(width),
+      is_unclear_(width),
+      is_odd_(width) {}
 
-/// With the middle pixels as pivots. The loop over the blocks of the row is the inner one, so that the compiler makes vectors of it.
-void BandSampler::count(int t) {
-  const int width = static_cast<int>(sum_.size()), radius = sampling_.radius_, row = sampling_.config_.decimation * t;
-  const float* pivots = rows_.every(0, row);
+/// With the middle pixels as pivots.
+void BandSampler::begin_count(const float* pivots) {
+  const int width = static_cast<int>(sum_.size());
+  const Sampling sampling = sampling_;  // a copy, which the loop does not change
+  float* __restrict__ lowest = lowest_.data(), * __restrict__ highest = highest_.data();
   for (int s = 0; s < width; ++s) {
-    lowest_[s] = sampling_.lowest(pivots[s]);
-    highest_[s] = sampling_.highest(pivots[s]);
-    sum_[s] = 0;
-    agree_[s] = nearer_[s] = farther_[s] = 0;
+    lowest[s] = sampling.lowest(pivots[s]);
+    highest[s] = sampling.highest(pivots[s]);
   }
-  const float *low = lowest_.data(), *high = highest_.data();
-  float* __restrict__ sum = sum_.data();
-  int* __restrict__ agree = agree_.data(), * __restrict__ nearer = nearer_.data(), * __restrict__ farther = farther_.data();
-  for (int dy = -radius; dy <= radius; ++dy)
-    for (int dx = -radius; dx <= radius; ++dx) {
-      const float* depth = rows_.every(dx, row + dy);
-      for (int s = 0; s < width; ++s) {
-        const float d = depth[s];
-        const int is_near = d < low[s] ? 1 : 0, is_far = d > high[s] ? 1 : 0, measured = d > 0 ? 1 : 0;
-        const int agrees = 1 - (is_near | is_far);
-        sum[s] += agrees != 0 ? d : 0;
-        agree[s] += agrees;
-        nearer[s] += is_near & measured;
-        farther[s] += is_far;
-      }
-    }
+  std::fill(sum_.begin(), sum_.end(), 0.0F);
+  for (std::vector<int>* counts : {&agree_, &farther_, &measured_}) std::fill(counts->begin(), counts->end(), 0);
+}
+
+/// The loops over the blocks of the row are the inner ones, so that the compiler makes vectors of them, but several pixels of each block
+/// are counted at once: sums that stay in registers need not be fetched.
+void BandSampler::count(int t) {
+  const int width = static_cast<int>(sum_.size()), radius = sampling_.radius_;
+  const auto add = [&](const auto& depth) {
+    count_columns(depth, width, lowest_.data(), highest_.data(), sum_.data(), agree_.data(), farther_.data(), measured_.data());
+  };
+  for (int row = sampling_.config_.decimation * t - radius, last = row + 2 * radius; row <= last; ++row) {
+    const auto every = [&, planes = rows_.planes_of(row)](int dx) { return planes + rows_.offset_of(dx); };
+    int dx = -radius;
+    for (; dx + 4 <= radius; dx += 5)
+      add(std::array<const float*, 5>{every(dx), every(dx + 1), every(dx + 2), every(dx + 3), every(dx + 4)});
+    for (; dx + 2 <= radius; dx += 3) add(std::array<const float*, 3>{every(dx), every(dx + 1), every(dx + 2)});
+    for (; dx <= radius; ++dx) add(std::array<const float*, 1>{every(dx)});
+  }
+}
+
+/// What the counts say of the blocks of a row: of all but the odd ones, of which the pixels must be looked at again. In two loops, because
+/// the compiler makes vectors of none that does it all.
+void BandSampler::take_means(const float* pivots, float* __restrict__ means, float* __restrict__ pivots_used, int* __restrict__ whole) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const int width = static_cast<int>(sum_.size()), edge = 2 * sampling_.radius_ + 1, all = edge * edge, least = sampling_.least_;
+  const float* sum = sum_.data();
+  const int *agree = agree_.data(), *farther = farther_.data(), *measured = measured_.data();
+  int* __restrict__ is_odd = is_odd_.data(), * __restrict__ is_unclear = is_unclear_.data();
+  for (int s = 0; s < width; ++s) {
+    const int nearer = measured[s] - agree[s] - farther[s], no_return = pivots[s] == kInfinity ? 1 : 0;
+    const int is_slope = std::min(nearer, farther[s]) > agree[s] ? 1 : 0, is_little = agree[s] < least ? 1 : 0;
+    is_unclear[s] = is_slope | is_little;
+    is_odd[s] = no_return | (is_unclear[s] & (measured[s] >= least ? 1 : 0));
+    whole[s] = (agree[s] == all ? 1 : 0) & (1 - no_return);  // blank pixels beside the image agree with +Inf, too
+  }
+  for (int s = 0; s < width; ++s) {
+    const float pivot = pivots[s], mean = sum[s] / static_cast<float>(std::max(agree[s], 1));
+    means[s] = is_unclear[s] != 0 ? 0 : mean;
+    pivots_used[s] = means[s] > 0 ? pivot : 0;
+  }
 }
 
 void BandSampler::sample_row(int t, SampledDepth& sampled) {
   rows_.move_to(t);
+  const float* pivots = rows_.every(0, sampling_.config_.decimation * t);
+  const int width = static_cast<int>(sum_.size());
+  const std::size_t first = static_cast<std::size_t>(t) * width;
+  begin_count(pivots);
   count(t);
-  const int width = static_cast<int>(sum_.size()), edge = 2 * sampling_.radius_ + 1, least = sampling_.least_;
-  const float* middle = rows_.every(0, sampling_.config_.decimation * t);
+  take_means(pivots, &sampled.means[first], &sampled.pivots[first], &sampled.whole[first]);
   for (int s = 0; s < width; ++s) {
-    const std::size_t n = static_cast<std::size_t>(t) * width + s;
-    const int agree = agree_[s], nearer = nearer_[s], farther = farther_[s];
-    float pivot = middle[s], mean = sum_[s] / static_cast<float>(std::max(agree, 1));
+    if (is_odd_[s] == 0) continue;
+    float pivot = pivots[s], &mean = sampled.means[first + s];
     if (std::isinf(pivot)) {
       mean = sampling_.has_no_return(rows_, s, t) ? pivot : 0;
-    } else if (agree < least || (nearer > agree && farther > agree)) {
-      mean = agree + nearer + farther < least ? 0 : sampling_.fill(rows_, s, t, &pivot);
+    } else {
+      mean = sampling_.fill(rows_, s, t, &pivot);
     }
-    sampled.means[n] = mean;
-    sampled.whole[n] = agree == edge * edge ? 1 : 0;
-    sampled.pivots[n] = mean > 0 && std::isfinite(mean) ? pivot : 0;
+    sampled.pivots[first + s] = mean > 0 && std::isfinite(mean) ? pivot : 0;
   }
 }
 
@@ -189,15 +244,14 @@ bool Sampling::has_no_return(const DepthRows& rows, int s, int t) const {
 /// be lost there, and leave rays of unknown space.
 std::vector<float> Sampling::in_range(const std::vector<float>& means, int width, int height) const {
   const float z_max = static_cast<float>(config_.z_max), near_limit = tolerance(z_max), beyond = std::nextafter(z_max, 2 * z_max);
-  std::vector<float> depth;
-  depth.reserve(means.size());
+  const DepthMeaning meaning(config_);
+  std::vector<float> depth(means.size());
+  std::transform(means.begin(), means.end(), depth.begin(), meaning);
   for (int t = 0; t < height; ++t)
     for (int s = 0; s < width; ++s) {
-      const float mean = means[static_cast<std::size_t>(t) * width + s];
-      if (!(std::abs(mean - z_max) <= near_limit)) {
-        depth.push_back(interpret(mean, config_));
-        continue;
-      }
+      const std::size_t n = static_cast<std::size_t>(t) * width + s;
+      const float mean = means[n];
+      if (!(std::abs(mean - z_max) <= near_limit)) continue;
       float sum = 0, count = 0;
       for (int row = std::max(t - 1, 0); row <= std::min(t + 1, height - 1); ++row)
         for (int column = std::max(s - 1, 0); column <= std::min(s + 1, width - 1); ++column) {
@@ -206,7 +260,7 @@ std::vector<float> Sampling::in_range(const std::vector<float>& means, int width
           sum += other;
           count += 1;
         }
-      depth.push_back(interpret(sum / count > z_max ? beyond : std::min(mean, z_max), config_));
+      depth[n] = meaning(sum / count > z_max ? beyond : std::min(mean, z_max));
     }
   return depth;
 }

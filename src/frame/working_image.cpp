@@ -62,16 +62,21 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
     throw BadFrame("The colour image must have data, 3 or 4 bytes per pixel, and rows that are long enough for its width.");
 }
 
-/// Depths of every decimation-th pixel in both directions, as interpret() says.
+/// Depths of every decimation-th pixel in both directions, as DepthMeaning says.
 std::vector<float> read_depth(const DepthImage& image, const Config& config) {
-  const int step = config.decimation;
-  std::vector<float> depth;
-  depth.reserve(static_cast<std::size_t>(image.width / step) * (image.height / step));
-  const auto read = [&](auto pixel) { depth.push_back(interpret(to_metres(pixel, config.depth_unit), config)); };
-  if (image.encoding == DepthImage::Encoding::kStepsU16)
-    for_each_pixel<std::uint16_t>(image, step, read);
-  else
-    for_each_pixel<std::uint32_t>(image, step, read);
+  const int step = config.decimation, width = image.width / step, height = image.height / step;
+  const DepthMeaning meaning(config);
+  std::vector<float> depth(static_cast<std::size_t>(width) * height), of_row(step == 1 ? 0 : image.width);
+  for (int t = 0; t < height; ++t) {
+    float* row = &depth[static_cast<std::size_t>(t) * width];
+    float* to = step == 1 ? row : of_row.data();
+    if (image.encoding == DepthImage::Encoding::kStepsU16)
+      read_row<std::uint16_t>(image, t * step, config.depth_unit, meaning, to);
+    else
+      read_row<std::uint32_t>(image, t * step, config.depth_unit, meaning, to);
+    if (step == 1) continue;
+    for (int s = 0; s < width; ++s) row[s] = of_row[static_cast<std::size_t>(s) * step];
+  }
   return depth;
 }
 
@@ -187,7 +192,8 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
   const Sampling sampling(config);
   SampledDepth sampled(static_cast<std::size_t>(width) * height);
   if (frame.color) image.color.resize(sampled.means.size());
-  in_row_bands(height, config.threads, [&](int first, int last) {
+  const std::size_t pixels = static_cast<std::size_t>(frame.depth.width) * frame.depth.height;
+  in_row_bands(height, frame.color ? 2 * pixels : pixels, config.threads, [&](int first, int last) {
     BandSampler band(sampling, frame.depth, width);
     std::optional<MeanColors> colors;
     if (frame.color) colors.emplace(*frame.color, band.rows(), sampling, config);
@@ -201,7 +207,12 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
 
 }  // namespace
 
-std::size_t WorkingImage::measured_pixels() const { return depth.size() - std::count(depth.begin(), depth.end(), 0.0F); }
+/// 32 bits hold the number, and are as wide as the depths: so the compiler makes vectors of the loop.
+std::size_t WorkingImage::measured_pixels() const {
+  std::uint32_t count = 0;
+  for (const float d : depth) count += d != 0 ? 1 : 0;
+  return count;
+}
 
 bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
