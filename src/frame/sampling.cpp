@@ -26,7 +26,10 @@ constexpr unsigned kAllSides = 0xff;
 
 /// Deals the pixels of a row out to four planes, one to each in turn. @return number of the pixels dealt
 int deal_to_four(const float* row, int width, int stride, float* planes) {
-  float* __restrict__ first = planes, * __restrict__ second = first + stride, * __restrict__ third = second + stride, * __restrict__ fourth = third + stride;
+  float* __restrict__ first = planes;
+  float* __restrict__ second = first + stride;
+  float* __restrict__ third = second + stride;
+  float* __restrict__ fourth = third + stride;
   for (int s = 0; s < width / 4; ++s) {
     first[s] = row[4 * s];
     second[s] = row[4 * s + 1];
@@ -38,7 +41,8 @@ int deal_to_four(const float* row, int width, int stride, float* planes) {
 
 /// As deal_to_four().
 int deal_to_two(const float* row, int width, int stride, float* planes) {
-  float* __restrict__ first = planes, * __restrict__ second = first + stride;
+  float* __restrict__ first = planes;
+  float* __restrict__ second = first + stride;
   for (int s = 0; s < width / 2; ++s) {
     first[s] = row[2 * s];
     second[s] = row[2 * s + 1];
@@ -206,32 +210,30 @@ void BandSampler::sample_row(int t, SampledDepth& sampled) {
   }
 }
 
-/// For a block whose middle pixel is lost, or measures what few others do. @return 0: no measurement
+/// For a block whose middle pixel is lost, or measures what few others do. Without branches, which a processor could not foresee.
+/// @return 0: no measurement
 float Sampling::fill(const DepthRows& rows, int s, int t, float* pivot) const {
   int nearest = std::numeric_limits<int>::max();
-  *pivot = 0;
+  float found = 0;
   for_each_pixel_of(rows, s, t, [&](float depth, int dx, int dy) {
-    const int distance = dx * dx + dy * dy;
-    if (depth == 0 || distance == 0 || distance >= nearest) return;
-    *pivot = depth;
-    nearest = distance;
+    const int distance = dx * dx + dy * dy, is_nearer = (depth != 0 ? 1 : 0) & (distance != 0 ? 1 : 0) & (distance < nearest ? 1 : 0);
+    found = is_nearer != 0 ? depth : found;
+    nearest = is_nearer != 0 ? distance : nearest;
   });
-  if (*pivot == 0 || std::isinf(*pivot)) return 0;
-  const float low = lowest(*pivot), high = highest(*pivot);
+  *pivot = found;
+  if (found == 0 || std::isinf(found)) return 0;
+  const float low = lowest(found), high = highest(found);
   float sum = 0;
-  int agree = 0, others = 0;
+  int agree = 0, measured = 0;
   unsigned sides = 0;
   for_each_pixel_of(rows, s, t, [&](float depth, int dx, int dy) {
-    if (depth == 0) return;
-    if (depth < low || depth > high) {
-      ++others;
-      return;
-    }
-    sum += depth;
-    ++agree;
-    sides |= sides_of(dx, dy);
+    const int agrees = (depth >= low ? 1 : 0) & (depth <= high ? 1 : 0);
+    sum += agrees != 0 ? depth : 0;
+    sides |= agrees != 0 ? sides_of(dx, dy) : 0U;
+    agree += agrees;
+    measured += depth != 0 ? 1 : 0;
   });
-  return agree >= least_ && agree >= kMostOthers * others && sides == kAllSides ? sum / static_cast<float>(agree) : 0;
+  return agree >= least_ && agree >= kMostOthers * (measured - agree) && sides == kAllSides ? sum / static_cast<float>(agree) : 0;
 }
 
 bool Sampling::has_no_return(const DepthRows& rows, int s, int t) const {
