@@ -96,7 +96,7 @@ void for_each_field(ConfigT& config, Visitor&& visit) {
   field(FieldInfo{"lanes", "", "points that one work item handles at once: 16 or 1; 0: 16 on a CPU with PoCL, 1 on other devices", 0, 16},
         config.lanes);
   field(FieldInfo{"stage_times_every", "",
-                  "the device's time of each stage is measured in one frame of so many; 0: in every frame on a CPU, in one of 16 on other "
+                  "the device's time of each stage is measured in one frame of so many; 0: in every frame on a CPU, in one of 32 on other "
                   "devices, where measuring costs more than launching",
                   0, 1000000},
         config.stage_times_every);

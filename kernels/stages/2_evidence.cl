@@ -115,6 +115,13 @@ INLINE intv deep_in_seen_space(const Frame* f, const SeenPoints* seen, Points p,
   return deep;
 }
 
+// What the work items of a group tell each other, where EVIDENCE_TEAM of them have a pixel together.
+typedef struct {
+  int supporting[HEAVY_GROUP], looking[HEAVY_GROUP];
+  uchar said[2][HEAVY_GROUP];  // by turns, so that one may be written while others still read the last round's
+  int any;
+} Team;
+
 // What the kernels ask: the last frames, older kept views, seen points and taken points.
 typedef struct {
   __global const View* last_frames;
@@ -123,44 +130,148 @@ typedef struct {
   __global const ushort* depths;
   SeenPoints seen, taken;
   int frame_count, view_count;
+  __local Team* told;
 } Witnesses;
+
+// Distances within which depths agree, and beyond which they contradict a surface [m].
+typedef struct {
+  floatv agree, weak, strong;
+} Margins;
+
+INLINE Margins margins_of(const TakeBackLimits* limits, const MeasuredPoints* m) {
+  return (Margins){limits->support_margin * m->voxel + m->noise, fmax(limits->weak_margin * m->voxel, m->noise),
+                   fmax(limits->strong_margin * m->voxel, m->noise)};
+}
+
+// Of LANES pixels: how many of the last frames support the surface, and minus the number of those that look there.
+typedef struct {
+  intv supports, looked;
+} Support;
+
+// Numbers of opinions: of weak contradictions, strong ones among them, views that agree but are older than the newest contradiction, and
+// newer ones, which may have seen the same thing.
+typedef struct {
+  intv strong, weak, agree, newer;
+} Opinions;
+
+// Which of LANES pixels have not heard enough opinions yet?
+INLINE intv undecided(const TakeBackLimits* limits, const Opinions* o, intv open) {
+  return open & MARK((o->weak + o->agree < limits->opinions) & (o->newer < limits->newer_opinions));
+}
+
+// Adds those of the next view.
+INLINE void add_opinions(intv agrees, intv contradicts, intv strongly, Opinions* o) {
+  const intv first = MARK(o->weak == 0);
+  o->newer -= agrees & first;
+  o->agree -= agrees & ~first;
+  o->weak -= contradicts;
+  o->strong -= strongly;
+}
+
+#if EVIDENCE_TEAM == 1
+INLINE Support support_of(const Witnesses* w, const MeasuredPoints* m, const Margins* margins) {
+  Support support = {0, 0};
+  for (int n = 0; n < w->frame_count; ++n) {
+    const View view = w->last_frames[n];
+    support.supports -= frame_supports(&view, w->images, m->p, margins->agree, m->measured, &support.looked);
+  }
+  return support;
+}
+
+INLINE Opinions opinions_of(const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m, const Margins* margins, intv open) {
+  Opinions opinions = {0, 0, 0, 0};
+  for (int n = 0; n < w->view_count; ++n) {
+    const intv asked = undecided(limits, &opinions, open);
+    if (!any_lane(asked)) break;
+    const View view = w->views[n];
+    const floatv farther = seen_farther(&view, w->depths, m->p, margins->weak, asked);
+    const intv contradicts = MARK(farther > margins->weak);
+    add_opinions(MARK(fabs(farther) <= margins->agree) & ~contradicts, contradicts, MARK(farther > margins->strong), &opinions);
+  }
+  return opinions;
+}
+#else
+// Where the work items of a team have a pixel together, each asks its own of the last frames and of the kept views, whose opinions are
+// added up in their order. Every work item of the group must call this.
+INLINE Support support_of(const Witnesses* w, const MeasuredPoints* m, const Margins* margins) {
+  const int item = get_local_id(0), own = item % EVIDENCE_TEAM, team = item - own;
+  Support support = {0, 0};
+  for (int n = own; n < w->frame_count; n += EVIDENCE_TEAM) {
+    const View view = w->last_frames[n];
+    support.supports -= frame_supports(&view, w->images, m->p, margins->agree, m->measured, &support.looked);
+  }
+  w->told->supporting[item] = support.supports;
+  w->told->looking[item] = support.looked;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int n = team; n < team + EVIDENCE_TEAM; ++n) {
+    if (n == item) continue;
+    support.supports += w->told->supporting[n];
+    support.looked += w->told->looking[n];
+  }
+  return support;
+}
+
+#define AGREES 1
+#define CONTRADICTS 2
+#define CONTRADICTS_STRONGLY 4
+
+INLINE Opinions opinions_of(const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m, const Margins* margins, intv open) {
+  const int item = get_local_id(0), own = item % EVIDENCE_TEAM, team = item - own;
+  Opinions opinions = {0, 0, 0, 0};
+  for (int first = 0, turn = 0; first < w->view_count; first += EVIDENCE_TEAM, turn = 1 - turn) {
+    __local uchar* said = w->told->said[turn];
+    const intv asked = undecided(limits, &opinions, open);
+    uchar opinion = 0;
+    if (asked && first + own < w->view_count) {
+      const View view = w->views[first + own];
+      const float farther = seen_farther(&view, w->depths, m->p, margins->weak, asked);
+      if (farther > margins->weak)
+        opinion = farther > margins->strong ? CONTRADICTS | CONTRADICTS_STRONGLY : CONTRADICTS;
+      else if (fabs(farther) <= margins->agree)
+        opinion = AGREES;
+    }
+    said[item] = opinion;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int n = team; n < team + EVIDENCE_TEAM && undecided(limits, &opinions, open); ++n)
+      add_opinions(MARK((said[n] & AGREES) != 0), MARK((said[n] & CONTRADICTS) != 0), MARK((said[n] & CONTRADICTS_STRONGLY) != 0),
+                   &opinions);
+  }
+  return opinions;
+}
+#endif
 
 // The evidence of LANES pixels.
 INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m) {
-  intv supports = 0, looked = 0;
-  const floatv margin = limits->support_margin * m->voxel + m->noise;
-  for (int n = 0; n < w->frame_count; ++n) {
-    const View view = w->last_frames[n];
-    supports -= frame_supports(&view, w->images, m->p, margin, m->measured, &looked);
-  }
-  intv open = m->measured & MARK(supports >= limits->weak_supports);
-  const floatv strong_margin = fmax(limits->strong_margin * m->voxel, m->noise),
-               weak_margin = fmax(limits->weak_margin * m->voxel, m->noise);
+  const Margins margins = margins_of(limits, m);
+  const Support support = support_of(w, m, &margins);
+  intv open = m->measured & MARK(support.supports >= limits->weak_supports);
   // What was taken back already need not be taken back again.
   if (f->has_taken) open &= ~seen_before(f, &w->taken, scaled(1.0f + divided(0.5f * limits->reach * m->voxel, lengths(m->p)), m->p), open);
 
-  // Numbers of opinions: of weak contradictions, strong ones among them, views that agree but are older than the newest contradiction, and
-  // newer ones, which may have seen the same thing.
-  intv strong = 0, weak = 0, agree = 0, newer = 0;
-  for (int n = 0; n < w->view_count; ++n) {
-    const intv asked = open & MARK((weak + agree < limits->opinions) & (newer < limits->newer_opinions));
-    if (!any_lane(asked)) break;
-    const View view = w->views[n];
-    const floatv farther = seen_farther(&view, w->depths, m->p, weak_margin, asked);
-    const intv contradicts = MARK(farther > weak_margin), agrees = MARK(fabs(farther) <= margin) & ~contradicts, first = MARK(weak == 0);
-    newer -= agrees & first;
-    agree -= agrees & ~first;
-    weak -= contradicts;
-    strong -= MARK(farther > strong_margin);
-  }
+  Opinions o = opinions_of(limits, w, m, &margins, open);
   if (f->has_seen) {
-    const intv by_seen = deep_in_seen_space(f, &w->seen, m->p, weak_margin, open & MARK(2 * (agree + newer) <= limits->contradictions));
-    weak = by_seen ? max(weak, limits->contradictions) : weak;
-    strong = deep_in_seen_space(f, &w->seen, m->p, strong_margin, by_seen) ? max(strong, limits->contradictions) : strong;
+    const intv by_seen =
+        deep_in_seen_space(f, &w->seen, m->p, margins.weak, open & MARK(2 * (o.agree + o.newer) <= limits->contradictions));
+    o.weak = by_seen ? max(o.weak, limits->contradictions) : o.weak;
+    o.strong = deep_in_seen_space(f, &w->seen, m->p, margins.strong, by_seen) ? max(o.strong, limits->contradictions) : o.strong;
   }
-  const intv is_weak = open & MARK((weak >= limits->contradictions) & (weak >= 2 * agree)),
-             is_strong = is_weak & MARK((strong >= limits->contradictions) & (LAST_FRAMES * supports >= -limits->strong_supports * looked));
+  const intv is_weak = open & MARK((o.weak >= limits->contradictions) & (o.weak >= 2 * o.agree)),
+             is_strong = is_weak & MARK((o.strong >= limits->contradictions) &
+                                        (LAST_FRAMES * support.supports >= -limits->strong_supports * support.looked));
   return is_strong ? STRONG_EVIDENCE : is_weak ? WEAK_EVIDENCE : NO_EVIDENCE;
+}
+
+// Is it true for any work item of those that work together? All of the group must ask.
+INLINE bool any_of_group(bool own, __local Team* told) {
+#if EVIDENCE_TEAM == 1
+  return own;
+#else
+  if (get_local_id(0) == 0) told->any = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (own) told->any = 1;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  return told->any != 0;
+#endif
 }
 
 INLINE int coarse_size(int pixels) { return (pixels + TAKE_SQUARE - 1) / TAKE_SQUARE; }
@@ -171,7 +282,8 @@ INLINE void store_bytes(intv values, int count, __global uchar* to) {
   for (int n = 0; n < min(count, LANES); ++n) to[n] = (uchar)some[n];
 }
 
-// Evidence at every TAKE_SQUARE-th column and row: every square has one of these pixels. One work item handles LANES of them.
+// Evidence at every TAKE_SQUARE-th column and row: every square has one of these pixels. One work item handles LANES of them, or a team of
+// work items handles one.
 //   in  depth[height][width] [m]: of this frame;  last_frames[frame_count], images;  views[view_count], depths: as in Witnesses
 //       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //   out coarse[coarse rows][coarse columns]: evidence;  count: the number of pixels with strong evidence is added to it
@@ -180,21 +292,25 @@ __kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __globa
                              __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
                              __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
                              __global const int* taken_bricks, __global uchar* coarse, __global uint* count) {
-  const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height), first = LANES * (int)get_global_id(0);
-  if (first >= pixels) return;
+  __local Team told;
+  const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height),
+            first = LANES * ((int)get_global_id(0) / EVIDENCE_TEAM);
+  if (EVIDENCE_TEAM == 1 && first >= pixels) return;
   const Witnesses w = {
-      last_frames, images,    views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
-      frame_count, view_count};
+      last_frames, images,     views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
+      frame_count, view_count, &told};
   const intv n = first + lane_numbers(), row = quotients(n, columns);
   const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, TAKE_SQUARE * (n - row * columns), TAKE_SQUARE * row);
   const intv evidence = evidence_of(&f, &limits, &w, &m);
+  if (first >= pixels || get_global_id(0) % EVIDENCE_TEAM != 0) return;
   store_bytes(evidence, pixels - first, coarse + first);
   const uint strong = lane_bits(MARK(evidence == STRONG_EVIDENCE));
   if (strong != 0) atomic_add(count, (uint)popcount(strong));
 }
 
 // Evidence of all pixels that may belong to a square with strong evidence, or be near enough to one; none of the others. One work item
-// handles LANES pixels of a row; work item n starts at pixel LANES n of rows that are filled up to whole chunks.
+// handles LANES pixels of a row, or a team of them one; the first of work item or team n is pixel LANES n of rows that are filled up to
+// whole chunks.
 //   in  as weigh_coarsely;  coarse: of it
 //   out evidence[height][width]
 __kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
@@ -202,21 +318,24 @@ __kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __globa
                              __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
                              __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
                              __global const int* taken_bricks, __global const uchar* coarse, __global uchar* evidence) {
-  const int chunks = chunks_of(f.grid.width), t = get_global_id(0) / chunks, first = LANES * (get_global_id(0) % chunks);
-  if (t >= f.grid.height) return;
+  __local Team told;
+  const int chunks = chunks_of(f.grid.width), n = get_global_id(0) / EVIDENCE_TEAM, t = n / chunks, first = LANES * (n % chunks);
+  if (EVIDENCE_TEAM == 1 && t >= f.grid.height) return;
   const int columns = coarse_size(f.grid.width), rows = coarse_size(f.grid.height), reach = TAKE_SQUARE / 2 + TAKE_GROWTH;
   bool near = false;
   for (int row = max(t - reach, 0) / TAKE_SQUARE; row <= min((t + reach) / TAKE_SQUARE, rows - 1); ++row)
     for (int column = max(first - reach, 0) / TAKE_SQUARE; column <= min((first + LANES - 1 + reach) / TAKE_SQUARE, columns - 1); ++column)
       near = near || coarse[row * columns + column] == STRONG_EVIDENCE;
   intv found = NO_EVIDENCE;
-  if (near) {
+  if (any_of_group(near, &told)) {
     const Witnesses w = {
-        last_frames, images,    views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
-        frame_count, view_count};
-    const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, first + lane_numbers(), (intv)(t));
+        last_frames, images,     views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
+        frame_count, view_count, &told};
+    MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, first + lane_numbers(), (intv)(t));
+    m.measured &= near ? (intv)(-1) : (intv)(0);
     found = evidence_of(&f, &limits, &w, &m);
   }
+  if (t >= f.grid.height || get_global_id(0) % EVIDENCE_TEAM != 0) return;
   store_bytes(found, f.grid.width - first, evidence + t * f.grid.width + first);
 }
 

@@ -11,6 +11,7 @@ WorkShape shape_for(const Device& device) {
   shape.is_near = device.is_cpu && device.lanes != 1;
   shape.many_items = device.lanes == 1;
   shape.heavy_group = device.is_pocl_cpu ? 1 : 64;
+  shape.evidence_team = shape.many_items && shape.heavy_group > 1 ? 16 : 1;
   shape.view_items = shape.heavy_group == 1 ? 64 : 1 << 14;
   if (shape.many_items) {
     shape.scan_alone = 16;

@@ -17,6 +17,7 @@ struct WorkShape {
                                   ///< looks for what it wants in the device's memory, which is its own
   bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
+  std::size_t evidence_team = 1;  ///< work items that have a pixel together where most of the time is waiting for kept views' images
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
   std::size_t scan_by_group = 0;  ///< so many by one work-group
   std::size_t scan_group = 1;     ///< work items of this group

@@ -50,6 +50,7 @@ struct Times {
 
   void add(const Report& report) {
     wall_ms.push_back(report.total_ms);
+    if (report.stages.empty()) return;  // Config::stage_times_every
     device_ms.push_back(0);
     for (const StageTime& stage : report.stages) {
       device_ms.back() += stage.ms;
@@ -78,7 +79,7 @@ void measure(const RawFrames& frames, const Config& config) {
                            std::to_string(frames.intrinsics.height / config.decimation) + " pixels";
   print_row(size.c_str(), times, report);
   std::printf("    checksum of the map          %s\n", checksum_text(map_checksum(mapper.surfels())).c_str());
-  for (const auto& [stage, ms] : times.stages_ms) std::printf("    %-28s %6.2f ms\n", stage.c_str(), quantile(ms, 0.5));
+  for (const auto& [stage, ms] : times.stages_ms) std::printf("    %-28s %7.3f ms\n", stage.c_str(), quantile(ms, 0.5));
 }
 
 /// The whole image for as long as it takes to use the memory of seen points.
