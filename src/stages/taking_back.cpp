@@ -130,9 +130,9 @@ void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
 
 void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
                        const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to) {
-  commands_.run(kStage, kernel, items * commands_.shape().evidence_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(), frame_views_(),
-                static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(), seen.slots(),
-                seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), from, to);
+  commands_.run(kStage, kernel, items * commands_.shape().evidence_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
+                frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(),
+                seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), from, to);
 }
 
 /// @return [height][width]: 1 for pixels whose surface takes space back
