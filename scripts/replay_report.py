@@ -110,6 +110,8 @@ def time_rows(summary):
 def stage_rows(summary):
     """(stage, mean, median, share of the mean, paper CPU, paper GPU) [ms]"""
     time = summary['time_ms']
+    if not time['stages']:
+        return []
     rows = []
     for name, stage in time['stages'].items():
         share = percent(stage['mean'] / time['mean'] if time['mean'] else None)

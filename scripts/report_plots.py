@@ -50,8 +50,9 @@ def time_per_frame(frames, stages):
     """Times per frame. `frames`: table of frames.csv; `stages`: names of its columns with the times of stages, in their order."""
     figure, (stacked, beside) = panels(2)
     index = range(len(frames))
-    timed = numpy.flatnonzero(sum(frames[name] for name in stages)) if stages else index  # others have no times of stages
-    stacked.stackplot(timed, [frames[name][timed] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)
+    if stages:
+        timed = numpy.flatnonzero(sum(frames[name] for name in stages))  # other frames have no times of stages
+        stacked.stackplot(timed, [frames[name][timed] for name in stages], labels=stages, colors=STAGE_COLORS, linewidth=0)
     stacked.plot(index, frames['total'], color=TOTAL, linewidth=0.8, label='total (wall)')
     stacked.set(xlabel='frame', ylabel='time [ms]', title=title_of_stages(frames), xlim=(0, max(len(frames) - 1, 1)),
                 ylim=(0, top_of_stages(frames)))

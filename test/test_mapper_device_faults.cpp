@@ -121,6 +121,15 @@ TEST_F(MapperDeviceFaults, TheFirstFrame) {
   EXPECT_GT(fail_everywhere(undecimated(), orbit_frames(small_camera(), 2, 6), 0, wanted), 20u);
 }
 
+/// The queue of timed frames takes the place of the other one, and may fail in that.
+TEST_F(MapperDeviceFaults, TheFirstTimedFrame) {
+  Config config = undecimated();
+  config.stage_times_every = 2;
+  Report wanted;
+  wanted.created = 100;
+  EXPECT_GT(fail_everywhere(config, orbit_frames(small_camera(), 3, 6), 1, wanted), 20u);
+}
+
 /// Out of memory: how much was needed, how much is in use, and how much there is.
 TEST_F(MapperDeviceFaults, TheNumbersAreTold) {
   const Frames frames = orbit_frames(small_camera(), 2, 6);

@@ -30,8 +30,10 @@ void expect_at_most(const Trips& trips, const Trips& most) {
 /// Frames in which surfels were split, space was taken back, now or earlier, or blocks were added to the memory of seen points take more,
 /// and are left out; so are those with many more candidates than the frame before.
 /// @return number of frames that were compared
-std::size_t compare(int lanes, const Trips& most) {
+/// @param timed_every  Config::stage_times_every
+std::size_t compare(int lanes, const Trips& most, int timed_every = 0) {
   Config config = undecimated();
+  config.stage_times_every = timed_every;
   config.lanes = lanes;
   Mapper mapper(config);
   std::size_t compared = 0;
@@ -49,7 +51,9 @@ std::size_t compare(int lanes, const Trips& most) {
 
 TEST(MapperTrips, OfACpu) { EXPECT_GT(compare(16, {4, 25, 3, 1, 1}), 3u); }
 
-TEST(MapperTrips, OfAGraphicsProcessor) { EXPECT_GT(compare(1, {2, 60, 8, 1, 1}), 3u); }
+TEST(MapperTrips, OfAGraphicsProcessor) {
+  for (const int timed_every : {1, 1000}) EXPECT_GT(compare(1, {2, 60, 8, 1, 1}, timed_every), 3u);
+}
 
 /// Timing costs a graphics processor more than launching; frames without it make the same map.
 TEST(MapperTrips, StagesAreTimedInOneFrameOfSoMany) {

@@ -50,6 +50,12 @@ class Page(unittest.TestCase):
         self.assertIn('<th>OctoMap</th>', self.page())
         self.assertNotIn('<th>OctoMap</th>', self.page(lambda summary: summary.pop('octomap')))
 
+    def test_stages_that_were_not_timed_are_left_out(self):
+        page = self.page(lambda summary: summary['time_ms'].update(stages={}))
+        self.assertNotIn('Time of the stages', page)
+        self.assertNotIn('outside the stages', page)
+        self.assertIn('outside the stages', self.page())
+
     def with_truth(self, summary):
         names = list(summary['exact'])
         summary['input']['truth'] = 'a/room/truth'

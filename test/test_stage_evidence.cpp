@@ -5,6 +5,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "stages/lattice_input.hpp"
 #include "stages/taking_back_fixture.hpp"
@@ -112,7 +113,7 @@ struct Evidence {
 /// How often the interesting cases decided.
 struct Tally {
   std::size_t weak = 0, strong = 0, by_seen = 0, old_surfaces = 0, taken_already = 0, enough_opinions = 0, chosen = 0, left_out = 0,
-              updates = 0;
+              updates = 0, many_views = 0;
 };
 
 struct Witnesses {
@@ -167,7 +168,9 @@ Evidence evidence_of(const Witnesses& w, int s, int t, Tally& tally) {
   const Truth asked = truth(supporting >= w.limits.weak_supports) && !is_taken;
 
   int weak = 0, strong = 0, agree = 0, newer = 0;
+  std::size_t views = 0;
   for (const SeenView& view : w.older) {
+    tally.many_views += ++views == 17;  // more than a team of work items asks at once
     if (weak + agree >= w.limits.opinions || newer >= w.limits.newer_opinions) {
       ++tally.enough_opinions;
       break;
@@ -270,6 +273,8 @@ struct Setup {
   double noise_growth = 0.0015;
   const CameraSetup* others = nullptr;  ///< another camera, whose frames are between this camera's
   int kept = 100;
+  std::pair<int, int> before = {5, 14};  ///< least and largest number of frames before something is put down
+  double motion = 0;                     ///< of the camera between frames [m]; 0: random
 };
 
 void check(CameraSetup camera, unsigned seed, const Setup& setup, Tally& tally) {
@@ -280,7 +285,9 @@ void check(CameraSetup camera, unsigned seed, const Setup& setup, Tally& tally) 
   camera.config.recent_views = setup.kept;
   Random random(seed);
   TakingBackFixture fixture(camera.config);
-  play(fixture, random_scenes(camera, random), camera, random, setup.others);
+  TwoScenes scenes = random_scenes(camera, random);
+  if (setup.motion > 0) scenes.motion = setup.motion;
+  play(fixture, scenes, camera, random, setup.others, setup.before);
   const MapWindow& window = fixture.map().window();
   if (setup.seen > 0) fill_lattice(fixture.seen(), window, setup.seen, 0.05, random);
   if (setup.taken > 0) fill_lattice(fixture.taking.taken(), window, setup.taken, 0.05, random);
@@ -351,6 +358,15 @@ TEST(StageEvidence, CamerasThatTakeTurns) {
     check(large, seed, {0, 0, 0.0015, &small}, tally);
   }
   EXPECT_TRUE((tally.strong > 100 && tally.chosen > 100) || small_tests()) << "nothing was tested";
+}
+
+/// The camera moves so far that many views do not have a surface: others are asked until enough have an opinion.
+TEST(StageEvidence, ManyViewsAreAsked) {
+  Tally tally;
+  for (const CameraSetup& camera : all_cameras())
+    for (unsigned seed = 100; seed < 100 + kSeeds; ++seed) check(camera, seed, {0, 0, 0.0015, nullptr, 100, {40, 60}, 0.3}, tally);
+  EXPECT_TRUE((tally.many_views > 100 && tally.strong > 100) || small_tests())
+      << "nothing was tested: " << tally.many_views << ", " << tally.strong;
 }
 
 TEST(StageEvidence, NothingMeasured) {

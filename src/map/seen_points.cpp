@@ -274,6 +274,20 @@ std::vector<BlockKey> SeenPoints::blocks() const {
   return blocks;
 }
 
+/// A block has up to 4096 bricks, most of them without points: these are passed over many at a time.
+std::vector<int> SeenPoints::bricks_with_points(int table) const {
+  constexpr int kMany = 64;
+  const cl_int* entries = &tables_[at(table, 0)];
+  std::vector<int> bricks;
+  for (int first = 0; first < bricks_of_block(); first += kMany) {
+    const int end = std::min(first + kMany, bricks_of_block());
+    if (std::count(entries + first, entries + end, SEEN_BRICK_EMPTY) == end - first) continue;
+    for (int brick = first; brick < end; ++brick)
+      if (entries[brick] != SEEN_BRICK_EMPTY) bricks.push_back(brick);
+  }
+  return bricks;
+}
+
 std::vector<BlockKey> SeenPoints::blocks_with_points() const {
   std::vector<BlockKey> blocks;
   for (const auto& [block, table] : table_of_) {

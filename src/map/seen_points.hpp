@@ -55,6 +55,7 @@ class SeenPoints {
   int table(const BlockKey& block);
   bool has_table(const BlockKey& block) const { return table_of_.count(block) != 0; }
   cl_int entry(int table, int brick) const { return tables_[at(table, brick)]; }
+  std::vector<int> bricks_with_points(int table) const;  ///< those of a block of which any point is seen
   int bricks_of_block() const { return 1 << (3 * shift_); }
   bool is_full(int table) const { return full_bricks_[table] == bricks_of_block(); }  ///< are all points of the block seen?
 

@@ -187,6 +187,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
                                 Report& report) {
   map.finish_frame("labels", number);
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
+  if (stage_times_every() > 1) commands.time_stages(false);
   taking_back.add_to_last_frames(camera, image, pose.T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
   pose_correction.add(image, pose);

@@ -105,8 +105,8 @@ class Commands {
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
   std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0, device_bytes_ = 0;
-  bool pending_ = false;      ///< commands may still run
-  bool times_stages_ = true;  ///< launches have events
+  bool pending_ = false;       ///< commands may still run
+  bool times_stages_ = false;  ///< launches have events; outside of a mapper's frames only on a CPU, where it costs nothing
 };
 
 /// A device buffer of T that grows and never shrinks.

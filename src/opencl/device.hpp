@@ -10,7 +10,7 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
-  bool is_pocl = false;        ///< of other platforms' devices we keep the built kernels as files; PoCL has a cache of its own, and what
+  bool is_pocl = false;        ///< of other drivers' devices we keep the built kernels as files; PoCL has a cache of its own, and what
                                ///< ours would gain there was not measured
   bool is_pocl_cpu = false;    ///< what WorkShape says of PoCL, which other drivers of CPUs do not share: they compile vectors of 16 for
                                ///< minutes, and barriers at once

@@ -83,9 +83,16 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
     change_bricks(*frame, camera, views, window, count > 0, bricks);
     taken_.open_window(window);
   }
-  frame->has_taken = bricks_with_points(window).empty() ? 0 : 1;
+  frame->has_taken = has_points(window) ? 1 : 0;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
+}
+
+/// Has any brick of the window taken points?
+bool TakingBack::has_points(const MapWindow& window) {
+  for (int cell = 0; cell < window.cells(); ++cell)
+    if (taken_.has_table(window.block(cell)) && !taken_.bricks_with_points(taken_.table(window.block(cell))).empty()) return true;
+  return false;
 }
 
 /// The bricks of the window that have taken points.
@@ -96,12 +103,11 @@ std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& w
   for (int cell = 0; cell < window.cells(); ++cell) {
     if (!taken_.has_table(window.block(cell))) continue;
     const int table = taken_.table(window.block(cell));
-    for (int brick = 0; brick < taken_.bricks_of_block(); ++brick)
-      if (taken_.entry(table, brick) != SEEN_BRICK_EMPTY)
-        bricks.push_back({table,
-                          brick,
-                          {{cell % w.size_x * sides + brick % sides, cell / w.size_x % w.size_y * sides + brick / sides % sides,
-                            cell / w.size_x / w.size_y * sides + brick / sides / sides, 0}}});
+    for (const int brick : taken_.bricks_with_points(table))
+      bricks.push_back({table,
+                        brick,
+                        {{cell % w.size_x * sides + brick % sides, cell / w.size_x % w.size_y * sides + brick / sides % sides,
+                          cell / w.size_x / w.size_y * sides + brick / sides / sides, 0}}});
   }
   return bricks;
 }
@@ -166,14 +172,15 @@ bool TakingBack::may_see(const WorkingImage& image, const Eigen::Vector3d& cente
   return false;
 }
 
-/// Places, counted in bricks from the window's corner, that the points behind chosen pixels may lie in.
-std::set<TakingBack::Place> TakingBack::places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
-                                                      const std::vector<cl_uchar>& chosen) const {
+/// Places, counted in bricks from the window's corner, that the points behind chosen pixels may lie in; sorted.
+std::vector<TakingBack::Place> TakingBack::places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
+                                                         const std::vector<cl_uchar>& chosen) const {
   const Eigen::Isometry3d T_local_camera = window.T_camera_local().inverse();
   const double brick_size = SEEN_BRICK * taken_.spacing();
-  std::set<Place> behind;
-  for (std::size_t n = 0; n < chosen.size(); ++n) {
-    if (chosen[n] == 0) continue;
+  std::vector<Place> behind;
+  Eigen::Array3i first_before(0, 0, 0), last_before(-1, -1, -1);
+  for (auto next = std::find(chosen.begin(), chosen.end(), 1); next != chosen.end(); next = std::find(next + 1, chosen.end(), 1)) {
+    const auto n = static_cast<std::size_t>(next - chosen.begin());
     const double s = static_cast<double>(n % g.width) - image.intrinsics.cx, t = static_cast<double>(n / g.width) - image.intrinsics.cy;
     const double near = image.depth[n], far = near + limits_.reach * std::max(near, static_cast<double>(g.z_min)) / g.f;
     Eigen::AlignedBox3d box;  // around the part of the pixel's pyramid
@@ -183,23 +190,29 @@ std::set<TakingBack::Place> TakingBack::places_behind(const Grid& g, const MapWi
           box.extend(T_local_camera * Eigen::Vector3d(x / image.intrinsics.fx * z, y / image.intrinsics.fy * z, z));
     const Eigen::Array3i first = (box.min() / brick_size).array().floor().cast<int>(),
                          last = (box.max() / brick_size).array().floor().cast<int>();
+    if ((first == first_before).all() && (last == last_before).all()) continue;  // neighbours mostly have the same places
+    first_before = first;
+    last_before = last;
     for (int z = first.z(); z <= last.z(); ++z)
       for (int y = first.y(); y <= last.y(); ++y)
-        for (int x = first.x(); x <= last.x(); ++x) behind.insert({x, y, z});
+        for (int x = first.x(); x <= last.x(); ++x) behind.push_back({x, y, z});
   }
+  std::sort(behind.begin(), behind.end());
+  behind.erase(std::unique(behind.begin(), behind.end()), behind.end());
   return behind;
 }
 
 /// The bricks of the window with taken points of which this frame may see something, and those that may get some behind chosen pixels.
 std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
                                                             const std::vector<cl_uchar>& chosen) {
-  const std::set<Place> behind = places_behind(frame.grid, window, image, chosen);
+  const std::vector<Place> behind = places_behind(frame.grid, window, image, chosen);
   const double brick_size = SEEN_BRICK * taken_.spacing();
   std::vector<Brick> bricks;
   for (const Brick& brick : bricks_with_points(window)) {
     const Place place = {brick.place.s[0], brick.place.s[1], brick.place.s[2]};
     const Eigen::Vector3d middle = Eigen::Vector3d(place[0], place[1], place[2]).array() + 0.5;
-    if (behind.count(place) == 0 && may_see(image, window.T_camera_local() * (middle * brick_size), std::sqrt(0.75) * brick_size + 1e-3))
+    if (!std::binary_search(behind.begin(), behind.end(), place) &&
+        may_see(image, window.T_camera_local() * (middle * brick_size), std::sqrt(0.75) * brick_size + 1e-3))
       bricks.push_back(brick);
   }
   const int shift = taken_.shift(), sides = 1 << shift;

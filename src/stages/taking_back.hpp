@@ -8,7 +8,6 @@
 #include <array>
 #include <deque>
 #include <memory>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -81,9 +80,10 @@ class TakingBack {
 
   using Place = std::array<int, 3>;  ///< x, y, z, counted in bricks from the window's corner
 
+  bool has_points(const MapWindow& window);
   std::vector<Brick> bricks_with_points(const MapWindow& window);
-  std::set<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
-                                const std::vector<cl_uchar>& chosen) const;
+  std::vector<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
+                                   const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
   void find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);

@@ -67,17 +67,29 @@ void print_row(const char* what, const Times& times, const Report& last) {
 }
 
 /// Maps all frames once.
-void measure(const RawFrames& frames, const Config& config) {
-  Mapper mapper(config);
+Times map_all(const RawFrames& frames, Mapper& mapper, Report* last) {
   Times times;
-  Report report;
   for (std::size_t n = 0; n < frames.frames.size(); ++n) {
-    report = mapper.integrate(frames.view(n));
-    if (n >= std::min(kWarmUp, frames.frames.size() / 2)) times.add(report);
+    *last = mapper.integrate(frames.view(n));
+    if (n >= std::min(kWarmUp, frames.frames.size() / 2)) times.add(*last);
   }
+  return times;
+}
+
+/// Times of whole frames as the mapper is used; and where it times the stages of few frames, once more with all of them timed.
+void measure(const RawFrames& frames, Config config) {
+  Mapper mapper(config);
+  Report report;
+  Times times = map_all(frames, mapper, &report);
   const std::string size = std::to_string(frames.intrinsics.width / config.decimation) + " x " +
                            std::to_string(frames.intrinsics.height / config.decimation) + " pixels";
   print_row(size.c_str(), times, report);
+  if (times.device_ms.size() < times.wall_ms.size()) {
+    config.stage_times_every = 1;
+    Mapper timed(config);
+    times = map_all(frames, timed, &report);
+    print_row("    each stage timed", times, report);
+  }
   std::printf("    checksum of the map          %s\n", checksum_text(map_checksum(mapper.surfels())).c_str());
   for (const auto& [stage, ms] : times.stages_ms) std::printf("    %-28s %7.3f ms\n", stage.c_str(), quantile(ms, 0.5));
 }

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "frame_fixture.hpp"
@@ -140,13 +141,14 @@ class TakingBackFixture : public FrameFixture {
 
 /// Frames before and after something was put down, and the start of the frame that decides.
 /// @param others  frames of it alternate with those of `camera`
+/// @param before  least and largest number of the frames before
 inline void play(TakingBackFixture& fixture, const TwoScenes& scenes, const reference::CameraSetup& camera, reference::Random& random,
-                 const reference::CameraSetup* others = nullptr) {
+                 const reference::CameraSetup* others = nullptr, std::pair<int, int> before = {5, 14}) {
   const auto frame = [&](bool after, double kept) {
     fixture.start(scenes, after, others != nullptr && random.chance(0.4) ? *others : camera, random);
     fixture.end(random.chance(kept));
   };
-  for (int n = random.whole(5, 14); n > 0; --n) frame(random.chance(0.15), 0.9);
+  for (int n = random.whole(before.first, before.second); n > 0; --n) frame(random.chance(0.15), 0.9);
   const double share = random.chance(0.5) ? 1 : 0.75;
   for (int n = random.chance(0.2) ? random.whole(2, 5) : LAST_FRAMES + random.whole(0, 2); n > 0; --n) frame(random.chance(share), 0.5);
   fixture.start(scenes, true, camera, random);
