@@ -202,7 +202,7 @@ TEST(Summary, HasTheRunsValues) {
 /// Graphics processors measure the stages in few frames: Config::stage_times_every.
 TEST(Summary, TimesOfStagesAreThoseOfTimedFrames) {
   const auto yardsticks = yardsticks_of_a_frame(0.02);
-  Run run = run_of(12);
+  auto run = run_of(12);
   for (FrameRecord& frame : run.frames)
     if (frame.report.total_ms != 8) frame.report.stages.clear();
   ordered_json json = summary_json({"a/folder", {}}, run, *yardsticks, some_scores());
