@@ -161,7 +161,7 @@ struct Report {
   std::size_t seen_bytes = 0;     ///< seen points: memory of what forgotten views have seen [byte]
   bool view_kept = false;         ///< the frame entered the recent views
   double total_ms = 0;            ///< wall time of integrate()
-  std::vector<StageTime> stages;  ///< device time of each stage, in running order; empty in frames without: stage_times_every
+  std::vector<StageTime> stages;  ///< device time of each stage, in running order; empty if they were not timed: stage_times_every
 };
 
 /// Size of the map and of the memory around it.

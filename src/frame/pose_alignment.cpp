@@ -190,7 +190,7 @@ void find_inverse_depths(const Seen& seen, const float* inverse_depth, int width
 
 /// Sums of a least squares problem.
 struct Sums {
-  Matrix6d A = Matrix6d::Zero();  ///< of w J J^T; the lower triangle
+  Matrix6d A = Matrix6d::Zero();  ///< of w J J^T; its lower triangle counts, as rounding differs above
   Vector6d b = Vector6d::Zero();  ///< of w e J
   std::size_t distances = 0;
 };
