@@ -3,6 +3,7 @@
 #include <random>
 
 #include "mapper_input.hpp"
+#include "opencl/fault_injection.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -159,6 +160,21 @@ TEST(MapperTakingBack, ForgetsEverythingWithTheMap) {
   EXPECT_EQ(mapper.size(), fresh.size());
 }
 
+/// Each time the host waits, a graphics processor runs dry: once for what is new, once for the end of the frame, as without taken points.
+TEST(MapperTakingBack, FramesThatOnlyGiveBackDoNotWaitForIt) {
+  Config config = with_range();
+  config.lanes = 1;
+  Mapper mapper(config);
+  add(mapper, 0, 20, false);
+  EXPECT_GT(add(mapper, 20, 40, true), 500U);
+  for (int n = 40; n < 50; ++n) {
+    FaultInjection::stop();
+    EXPECT_EQ(add(mapper, n, n + 1, false), 0U);
+    EXPECT_LE(FaultInjection::count(Call::kWait), 2U) << "frame " << n;
+  }
+  EXPECT_EQ(surfels_at_box(mapper.surfels()), 0U);
+}
+
 TEST(MapperTakingBack, TheMapDoesNotDependOnWidthAndThreads) {
   std::vector<std::vector<Surfel>> maps;
   for (const auto& [lanes, threads] : {std::pair(16, 1), std::pair(16, 2), std::pair(1, 2)}) {
@@ -169,6 +185,7 @@ TEST(MapperTakingBack, TheMapDoesNotDependOnWidthAndThreads) {
     add(mapper, 0, 15, false);
     add(mapper, 15, 30, true);
     add(mapper, 30, 40, false);
+    add(mapper, 40, 55, true);
     maps.push_back(mapper.surfels());
   }
   EXPECT_TRUE(same(maps[0], maps[1]));

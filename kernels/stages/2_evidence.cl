@@ -286,12 +286,12 @@ INLINE void store_bytes(intv values, int count, __global uchar* to) {
 // work items handles one.
 //   in  depth[height][width] [m]: of this frame;  last_frames[frame_count], images;  views[view_count], depths: as in Witnesses
 //       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
-//   out coarse[coarse rows][coarse columns]: evidence;  count: the number of pixels with strong evidence is added to it
+//   out coarse[coarse rows][coarse columns]: evidence
 __kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
                              const int frame_count, __global const float* images, __global const View* views, const int view_count,
                              __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
                              __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
-                             __global const int* taken_bricks, __global uchar* coarse, __global uint* count) {
+                             __global const int* taken_bricks, __global uchar* coarse) {
   __local Team told;
   const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height),
             first = LANES * ((int)get_global_id(0) / EVIDENCE_TEAM);
@@ -304,8 +304,6 @@ __kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __globa
   const intv evidence = evidence_of(&f, &limits, &w, &m);
   if (first >= pixels || get_global_id(0) % EVIDENCE_TEAM != 0) return;
   store_bytes(evidence, pixels - first, coarse + first);
-  const uint strong = lane_bits(MARK(evidence == STRONG_EVIDENCE));
-  if (strong != 0) atomic_add(count, (uint)popcount(strong));
 }
 
 // Evidence of all pixels that may belong to a square with strong evidence, or be near enough to one; none of the others. One work item
@@ -352,8 +350,9 @@ __kernel void find_squares(const Frame f, __global const uchar* evidence, __glob
 }
 
 // Pixels whose surface takes space back: those with evidence that are near the middle of a square. One work item handles a pixel.
-//   out chosen[height][width]: 1 or 0
-__kernel void choose_pixels(const Frame f, __global const uchar* evidence, __global const uchar* squares, __global uchar* chosen) {
+//   out chosen[height][width]: 1 or 0;  count: the number of such pixels is added to it
+__kernel void choose_pixels(const Frame f, __global const uchar* evidence, __global const uchar* squares, __global uchar* chosen,
+                            __global uint* count) {
   const int n = get_global_id(0), s = n % f.grid.width, t = n / f.grid.width;
   if (t >= f.grid.height) return;
   bool near = false;
@@ -362,4 +361,5 @@ __kernel void choose_pixels(const Frame f, __global const uchar* evidence, __glo
       for (int u = max(s - TAKE_GROWTH, 0); u <= min(s + TAKE_GROWTH, f.grid.width - 1); ++u)
         near = near || squares[v * f.grid.width + u] != 0;
   chosen[n] = near ? 1 : 0;
+  if (near) atomic_inc(count);
 }

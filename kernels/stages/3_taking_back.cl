@@ -21,16 +21,17 @@ INLINE intv behind_chosen(const Grid* g, const TakeBackLimits* limits, const Vie
   return lane_marks(marks);
 }
 
-// One work item handles a cube of words of a brick, as see_points does.
+// One work item handles a cube of words of a brick, as see_points does. Without has_chosen it is launched before the host knows whether any
+// pixel was chosen: if so, nothing is done here, because the host launches it again with more bricks.
 //   in  own_view: from the window's frame to this frame's image;  depths: its image, as views keep it
-//       depth, chosen [height][width]: of this frame, chosen only if has_chosen
+//       depth, chosen [height][width]: of this frame;  chosen_count: of choose_pixels
 //       taken_by[count]: x, y, z of a brick, counted in bricks from the window's corner, and its number
 //   i/o bricks: bits of the points behind chosen pixels are set, and those of points that this frame sees are cleared
 __kernel void take_points(const Frame f, const TakeBackLimits limits, const View own_view, __global const ushort* depths,
-                          __global const float* depth, const int has_chosen, __global const uchar* chosen, __global const int4* taken_by,
-                          const int count, __global ulong* bricks) {
+                          __global const float* depth, const int has_chosen, __global const uchar* chosen,
+                          __global const uint* chosen_count, __global const int4* taken_by, const int count, __global ulong* bricks) {
   const int n = get_global_id(0) / SEE_CUBES, cube = get_global_id(0) % SEE_CUBES, edges = 4 / SEE_EDGE;
-  if (n >= count) return;
+  if (n >= count || (*chosen_count > 0) != (has_chosen != 0)) return;
   const int4 brick = taken_by[n];
   const int3 corner = SEE_EDGE * (int3)(cube % edges, cube / edges % edges, cube / edges / edges);  // [word]
   __global ulong* words = bricks + SEEN_WORDS * brick.w + (corner.z * 4 + corner.y) * 4 + corner.x;

@@ -115,12 +115,12 @@ double Mapper::Impl::seen_spacing(const Camera& camera) const {
 /// The device does all of it before the host asks what has come of it. In few frames it has to be done again: surfels were too large, space
 /// is taken back, or there were far more candidates than in the last frame.
 SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
-  bool is_judged = false;  // the evidence for taking back
-  const auto judge = [&] {
-    report.taken_back = taking_back.update(camera, map.window(), image, views, seen, &frame);
-    is_judged = true;
-  };
-  if (taking_back.has_taken()) judge();  // else it hardly ever changes anything, and nothing is kept waiting for it
+  bool is_judged = taking_back.is_likely();  // the evidence for taking back
+  const auto judge = [&] { report.taken_back = taking_back.update(camera, map.window(), image, views, &frame); };
+  if (is_judged)
+    judge();
+  else
+    report.taken_back = taking_back.give_back(camera, map.window(), image, views, &frame);
 
   for (;;) {
     // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
@@ -151,9 +151,10 @@ SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Came
 
     // Space is taken back: then surfels float in it. Those that the visit has marked for labels too many leave the map, which marks them
     // as well
-    if (!is_judged) {
+    if (!is_judged && taking_back.must_update()) {
       judge();
-      if (frame.takes_back) continue;
+      is_judged = true;
+      continue;
     }
 
     if (report.split == 0) report.in_view = found.in_view;

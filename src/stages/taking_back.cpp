@@ -42,11 +42,13 @@ TakingBack::TakingBack(Commands& commands, const Config& config, double block_si
       squares_(commands),
       chosen_(commands),
       states_(commands),
-      strong_count_(commands) {}
+      chosen_count_(commands) {}
 
 void TakingBack::clear() {
   last_frames_.clear();
   pixels_ = 0;
+  frames_since_ = LAST_FRAMES;
+  changed_bricks_.clear();
   taken_.clear();
   changed_.clear();
 }
@@ -63,29 +65,53 @@ void TakingBack::open_window(const MapWindow& window, const SeenPoints& seen) {
 }
 
 void TakingBack::look(const Camera& camera, const RecentViews& views, const SeenPoints& seen, Frame* frame) {
-  strong_count_now_ = nullptr;
   if (!is_on_) return;
+  changed_bricks_.clear();  // of a frame that failed: they keep words of their own
   frame->has_taken = taken_.empty() ? 0 : 1;
+  chosen_count_.resize(1);
+  chosen_count_.fill(kStage, 0, 1);
   find_evidence(*frame, camera, views, seen);
+  chosen_count_now_ = chosen_count_.read_later(1);
 }
 
 std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
-                               const SeenPoints& seen, Frame* frame) {
+                               Frame* frame) {
   if (!is_on_) return 0;
   commands_.wait();
-  std::vector<cl_uchar> chosen;
-  if (strong_count_now_ != nullptr && strong_count_now_->front() > 0) chosen = choose_pixels(*frame, camera, views, seen);
-  const auto count = static_cast<std::size_t>(std::count(chosen.begin(), chosen.end(), 1));
+  settle_bricks();
+  const std::size_t count = chosen_count_now_->front();
   if (count == 0 && taken_.empty()) return pixels_;
+  const std::vector<cl_uchar> chosen = count > 0 ? chosen_.read(image.depth.size()) : std::vector<cl_uchar>();
   pixels_ = std::max(pixels_, count);  // before anything is changed
-  const std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
+  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
   if (!bricks.empty()) {
-    change_bricks(*frame, camera, views, window, count > 0, bricks);
+    change_bricks(*frame, camera, views, window, count > 0, std::move(bricks));
+    commands_.wait();
+    settle_bricks();
     taken_.open_window(window);
   }
   frame->has_taken = has_points(window) ? 1 : 0;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
+}
+
+std::size_t TakingBack::give_back(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
+                                  Frame* frame) {
+  if (!has_taken()) return pixels_;
+  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, {});
+  if (!bricks.empty()) {
+    change_bricks(*frame, camera, views, window, false, std::move(bricks));
+    taken_.open_window(window);
+  }
+  frame->has_taken = has_points(window) ? 1 : 0;
+  frame->takes_back = pixels_ > 0 ? 1 : 0;
+  return pixels_;
+}
+
+bool TakingBack::must_update() {
+  if (!is_on_) return false;
+  settle_bricks();
+  return chosen_count_now_->front() > 0;
 }
 
 /// Has any brick of the window taken points?
@@ -112,7 +138,7 @@ std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& w
   return bricks;
 }
 
-/// Counts the coarse pixels that have strong evidence.
+/// Chooses the pixels whose surface takes space back, and counts them.
 void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
   if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return;
   std::vector<View> last, older = views.views_before(last_frames_.back().number);
@@ -125,31 +151,23 @@ void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
   older_count_ = static_cast<cl_int>(older.size());
   older_views_.send(std::move(older));
 
-  const auto across = [](int pixels) { return static_cast<std::size_t>((pixels + TAKE_SQUARE - 1) / TAKE_SQUARE); };
+  const auto across = [](int size) { return static_cast<std::size_t>((size + TAKE_SQUARE - 1) / TAKE_SQUARE); };
   const std::size_t coarse = across(frame.grid.width) * across(frame.grid.height);
-  coarse_.resize(coarse);
-  strong_count_.resize(1);
-  strong_count_.fill(kStage, 0, 1);
-  weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_(), strong_count_());
-  strong_count_now_ = strong_count_.read_later(1);
-}
-
-void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
-                       const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to) {
-  commands_.run(kStage, kernel, items * commands_.shape().evidence_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
-                frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(),
-                seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), from, to);
-}
-
-/// @return [height][width]: 1 for pixels whose surface takes space back
-std::vector<cl_uchar> TakingBack::choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views,
-                                                const SeenPoints& seen) {
   const std::size_t rows = frame.grid.height, pixels = frame.grid.width * rows;
-  for (DeviceArray<cl_uchar>* image : {&evidence_, &squares_, &chosen_}) image->resize(pixels);
+  coarse_.resize(coarse);
+  for (DeviceArray<cl_uchar>* all : {&evidence_, &squares_, &chosen_}) all->resize(pixels);
+  weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_());
   weigh("weigh_evidence", commands_.chunks(frame.grid.width) * rows, frame, camera, views, seen, coarse_(), evidence_());
   commands_.run(kStage, "find_squares", pixels, kGroup, frame, evidence_(), squares_());
-  commands_.run(kStage, "choose_pixels", pixels, kGroup, frame, evidence_(), squares_(), chosen_());
-  return chosen_.read(pixels);
+  commands_.run(kStage, "choose_pixels", pixels, kGroup, frame, evidence_(), squares_(), chosen_(), chosen_count_());
+}
+
+template <typename... Images>
+void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
+                       const SeenPoints& seen, const Images&... images) {
+  commands_.run(kStage, kernel, items * commands_.shape().evidence_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
+                frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(),
+                seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), images...);
 }
 
 /// May this frame see something of a cube? @param center  camera frame [m]; radius: of the sphere around the cube [m]
@@ -226,9 +244,10 @@ std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, 
   return bricks;
 }
 
-/// Sets and clears the points of bricks, which get words of their own for that.
+/// Sets and clears the points of bricks, which get words of their own for that. settle_bricks() must follow.
+/// @param has_chosen  if not, and pixels were chosen all the same, the device changes nothing
 void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
-                               const std::vector<Brick>& bricks) {
+                               std::vector<Brick> bricks) {
   std::vector<cl_int4> taken_by;
   const Window& w = window.window();
   for (const Brick& b : bricks) {
@@ -245,11 +264,19 @@ void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const R
   const cl::Buffer& chosen = has_chosen ? chosen_() : camera.depth()();  // a kernel takes no missing buffer
   commands_.run(kStage, "take_points", taken_.cubes(bricks.size()), commands_.shape().heavy_group, frame, limits_,
                 views.own_view_from(window.T_camera_local()), views.depths(), camera.depth()(), static_cast<cl_int>(has_chosen), chosen,
-                taken_by_(), count, taken_.brick_words());
+                chosen_count_(), taken_by_(), count, taken_.brick_words());
   commands_.run(kStage, "find_brick_states", count, kGroup, taken_by_(), count, taken_.brick_words(), states_());
-  const std::vector<cl_uchar> states = states_.read(bricks.size());
-  for (std::size_t n = 0; n < bricks.size(); ++n)
-    if (states[n] != SEEN_MIXED) taken_.set_uniform(bricks[n].table, bricks[n].brick, states[n] == SEEN_ALL);
+  states_now_ = states_.read_later(bricks.size());
+  changed_bricks_ = std::move(bricks);
+}
+
+/// Bricks that have become uniform need no words of their own. The host has waited for their states.
+void TakingBack::settle_bricks() {
+  for (std::size_t n = 0; n < changed_bricks_.size(); ++n) {
+    const cl_uchar state = (*states_now_)[n];
+    if (state != SEEN_MIXED) taken_.set_uniform(changed_bricks_[n].table, changed_bricks_[n].brick, state == SEEN_ALL);
+  }
+  changed_bricks_.clear();
 }
 
 void TakingBack::add_to_last_frames(const Camera& camera, const WorkingImage& image, const Eigen::Isometry3d& T_world_camera,
@@ -266,6 +293,7 @@ void TakingBack::add_to_last_frames(const Camera& camera, const WorkingImage& im
   images_.copy_from(camera.depth()(), pixels, room * room_size_);
   if (is_full) last_frames_.pop_back();
   last_frames_.push_front({image.intrinsics, T_world_camera, room, number});
+  frames_since_ = pixels_ > 0 ? 0 : std::min<std::size_t>(frames_since_ + 1, LAST_FRAMES);
   pixels_ = 0;
 }
 

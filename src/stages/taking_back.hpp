@@ -30,18 +30,27 @@ class TakingBack {
   /// taken points: these would be forgotten.
   void open_window(const MapWindow& window, const SeenPoints& seen);
 
-  /// Asks whether this frame has evidence against what is known. update() needs the answer, and waits for it unless the host has waited for
-  /// the device meanwhile.
+  /// Asks whether this frame has evidence against what is known. The others need the answer. open_window() must have been called for both
+  /// lattices. Does not wait for the device.
+  /// @param seen  seen points
   void look(const Camera& camera, const RecentViews& views, const SeenPoints& seen, Frame* frame);
 
-  /// To be called after look(). Takes space back behind the surfaces of this frame that the last frames support and that known space
-  /// contradicts, and gives back what this frame sees. After that frame->has_taken says whether any point of the window is taken, and
-  /// frame->takes_back whether this frame has taken some.
-  /// @param seen  seen points; open_window() must have been called for both lattices
+  /// Takes space back behind the surfaces of this frame that the last frames support and that known space contradicts, and gives back what
+  /// this frame sees. After that frame->has_taken says whether any point of the window is taken, and frame->takes_back whether this frame
+  /// has taken some. Waits for the device.
   /// @return number of pixels whose surface took space back
   /// @throws cl::Error  the device failed: what was taken back stays so, and counts for the next frame
-  std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
-                     const SeenPoints& seen, Frame* frame);
+  std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views, Frame* frame);
+
+  /// For frames that hardly take space back: the same as update(), unless must_update() says later that this frame does. Does not wait for
+  /// the device: frame->has_taken says whether any point of the window may be taken.
+  std::size_t give_back(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views, Frame* frame);
+
+  /// To be called after give_back(), once the host has waited for the device.
+  bool must_update();
+
+  /// Has one of the frames just before taken space back? Then this one is likely to.
+  bool is_likely() const { return frames_since_ < LAST_FRAMES; }
 
   /// Ends a frame: later ones may ask whether it supports their surfaces.
   /// @param camera  has the image
@@ -58,7 +67,7 @@ class TakingBack {
   const SeenPoints& taken() const { return taken_; }
   bool has_taken() const { return is_on_ && !taken_.empty(); }
 
-  /// @name Of the last update() that found strong evidence at all, [height][width] of the working image
+  /// @name Of the last look() that had views or seen points to ask, [height][width] of the working image
   /// @{
   /// NO_EVIDENCE, WEAK_EVIDENCE or STRONG_EVIDENCE
   const DeviceArray<cl_uchar>& evidence() const { return evidence_; }
@@ -86,29 +95,33 @@ class TakingBack {
                                    const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
   void find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
-  std::vector<cl_uchar> choose_pixels(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<Brick> bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
                                       const std::vector<cl_uchar>& chosen);
   void change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
-                     const std::vector<Brick>& bricks);
+                     std::vector<Brick> bricks);
+  void settle_bricks();
+  template <typename... Images>
   void weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
-             const SeenPoints& seen, const cl::Buffer& from, const cl::Buffer& to);
+             const SeenPoints& seen, const Images&... images);
 
   Commands& commands_;
   const TakeBackLimits limits_;
   const bool is_on_;
   SeenPoints taken_;
   std::vector<BlockKey> changed_;
-  std::deque<LastFrame> last_frames_;  ///< newest first, at most LAST_FRAMES
-  std::size_t pixels_ = 0;             ///< whose surface has taken space back since the last frame that did not fail
-  std::size_t room_size_ = 0;          ///< [pixel]
-  DeviceArray<float> images_;          ///< [LAST_FRAMES][room_size_]: depths of the last frames
+  std::deque<LastFrame> last_frames_;       ///< newest first, at most LAST_FRAMES
+  std::size_t pixels_ = 0;                  ///< whose surface has taken space back since the last frame that did not fail
+  std::size_t frames_since_ = LAST_FRAMES;  ///< that took space back
+  std::size_t room_size_ = 0;               ///< [pixel]
+  DeviceArray<float> images_;               ///< [LAST_FRAMES][room_size_]: depths of the last frames
   SentArray<View> frame_views_, older_views_;
   cl_int older_count_ = 0;
   SentArray<cl_int4> taken_by_;
   DeviceArray<cl_uchar> coarse_, evidence_, squares_, chosen_, states_;
-  DeviceArray<cl_uint> strong_count_;
-  std::shared_ptr<const std::vector<cl_uint>> strong_count_now_;  ///< of this frame, if it was asked for
+  DeviceArray<cl_uint> chosen_count_;
+  std::shared_ptr<const std::vector<cl_uint>> chosen_count_now_;  ///< of this frame, after the next wait
+  std::vector<Brick> changed_bricks_;                             ///< that settle_bricks() has to look at
+  std::shared_ptr<const std::vector<cl_uchar>> states_now_;       ///< of these, after the next wait
 };
 
 }  // namespace frontier_surfels
