@@ -7,7 +7,7 @@
 
 // A work-group of one item waits for nobody, and PoCL, where it has one (src/opencl/work_shape.hpp), takes minutes to compile barriers
 // within branches and loops.
-#if HEAVY_GROUP == 1
+#if TILE_GROUP == 1
 #define GROUP_BARRIER(flags)
 #else
 #define GROUP_BARRIER(flags) barrier(flags)

@@ -34,8 +34,8 @@ INLINE Points surfel_normals(const Grid* g, const Limits* limits, const View* vi
 // Positions of new surfels in their voxels: they slide along their normals until they are near the boundary, by whole steps. A step is left
 // in hand before what this view or a kept one knows, and a surfel that has known space at front_probe before it does not lose it.
 //   taken: marks of those at points that were taken back, for which this view alone counts
-INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const SeenPoints* seen, bool ask_seen,
-                                __global const ushort* depths, Voxels v, Points center, Points normal, intv taken, intv asked) {
+INLINE Points slide_to_boundary(const Frame* f, ViewsAround* around, const SeenPoints* seen, bool ask_seen, __global const ushort* depths,
+                                Voxels v, Points center, Points normal, intv taken, intv asked) {
   const Grid* g = &f->grid;
   const Limits* limits = &f->limits;
   const View* view = &f->own_view;
@@ -52,7 +52,7 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
     steps -= moving;
   }
   intv open = asked & ~taken & MARK(steps > 0);
-  while (any_lane(open)) {
+  for (int n = 0; n < SLIDE_STEPS && must_ask(open); ++n) {
     intv known = any_view_knows(around, depths, add_scaled(center, convert_floatv(steps + 1), forward), open);
     known |= any_view_knows(around, depths, add_scaled(center, convert_floatv(steps), forward), open & ~known);
     if (ask_seen) known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
@@ -62,7 +62,7 @@ INLINE Points slide_to_boundary(const Frame* f, const ViewsAround* around, const
   return add_scaled(center, convert_floatv(steps), forward);
 }
 
-// One work item handles a chunk of LANES new surfels.
+// One work item handles a chunk of LANES new surfels, or `team` of them handle one.
 //   in  seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
 //       created[length[0]]: their numbers among the listed candidates, whose voxels, around and directions are find_directions'
 //       views: the kept ones;  tile_views: of settle_candidates;  depths: images of views, this frame's among them
@@ -72,10 +72,13 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
                              __global const int* seen_tables, __global const int* seen_bricks, __global const int* taken_slots,
                              __global const int* taken_tables, __global const int* taken_bricks, __global const uchar* tile_seen,
                              __global const int* created, __global const uint* length, __global const int* voxels,
-                             __global const int* around, __global const float* directions, __global uint4* new_surfels,
+                             __global const int* around, __global const float* directions, const int team, __global uint4* new_surfels,
                              __global int* new_cells) {
-  const int chunk = get_global_id(0), count = (int)length[0];
-  if (chunk * LANES >= count) return;
+  __local Answers told;
+  const int count = (int)length[0];
+  int chunk;
+  bool writes;
+  if (!find_chunk(count, team, &chunk, &writes)) return;
   intv exist, ragged = 0;
   const intv numbers = load_chunk(created, count, chunk, &exist);
   const Voxels v = voxels_of(&f.grid, gather_int(voxels, numbers));
@@ -83,7 +86,7 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
   Points p = center, normal = normalized(gather_directions(directions, numbers));
   if (f.limits.refine) {
     ViewsAround near;
-    find_views_around(&f.grid, views, tile_views, view_groups, v, &near);
+    find_views_around(&f.grid, views, tile_views, view_groups, v, team, &told, &near);
     normal = surfel_normals(&f.grid, &f.limits, &f.own_view, depths, layer_depth, v, center, normal, gather_int(around, numbers), exist,
                             &ragged);
     const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
@@ -92,6 +95,7 @@ __kernel void create_surfels(const Frame f, __global const View* views, __global
     const intv is_taken = f.has_taken ? seen_before(&f, &taken, center, exist) : 0;
     p = slide_to_boundary(&f, &near, &seen, f.has_seen && ask_seen, depths, v, center, normal, is_taken, exist);
   }
+  if (!writes) return;
   const floatv radius = f.limits.create_radius * voxel_size(&f.grid, center.z);
   const uintv attributes = ragged ? (uintv)(SURFEL_RAGGED) : (uintv)(0);
   intv cells;

@@ -115,7 +115,7 @@ INLINE intv deep_in_seen_space(const Frame* f, const SeenPoints* seen, Points p,
   return deep;
 }
 
-// What the work items of a group tell each other, where EVIDENCE_TEAM of them have a pixel together.
+// What the work items of a group tell each other, where VIEW_TEAM of them have a pixel together.
 typedef struct {
   int supporting[HEAVY_GROUP], looking[HEAVY_GROUP];
   uchar said[2][HEAVY_GROUP];  // by turns, so that one may be written while others still read the last round's
@@ -168,7 +168,7 @@ INLINE void add_opinions(intv agrees, intv contradicts, intv strongly, Opinions*
   o->strong -= strongly;
 }
 
-#if EVIDENCE_TEAM == 1
+#if VIEW_TEAM == 1
 INLINE Support support_of(const Witnesses* w, const MeasuredPoints* m, const Margins* margins) {
   Support support = {0, 0};
   for (int n = 0; n < w->frame_count; ++n) {
@@ -194,16 +194,16 @@ INLINE Opinions opinions_of(const TakeBackLimits* limits, const Witnesses* w, co
 // Where the work items of a team have a pixel together, each asks its own of the last frames and of the kept views, whose opinions are
 // added up in their order. Every work item of the group must call this.
 INLINE Support support_of(const Witnesses* w, const MeasuredPoints* m, const Margins* margins) {
-  const int item = get_local_id(0), own = item % EVIDENCE_TEAM, team = item - own;
+  const int item = get_local_id(0), own = item % VIEW_TEAM, team = item - own;
   Support support = {0, 0};
-  for (int n = own; n < w->frame_count; n += EVIDENCE_TEAM) {
+  for (int n = own; n < w->frame_count; n += VIEW_TEAM) {
     const View view = w->last_frames[n];
     support.supports -= frame_supports(&view, w->images, m->p, margins->agree, m->measured, &support.looked);
   }
   w->told->supporting[item] = support.supports;
   w->told->looking[item] = support.looked;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (int n = team; n < team + EVIDENCE_TEAM; ++n) {
+  for (int n = team; n < team + VIEW_TEAM; ++n) {
     if (n == item) continue;
     support.supports += w->told->supporting[n];
     support.looked += w->told->looking[n];
@@ -216,9 +216,9 @@ INLINE Support support_of(const Witnesses* w, const MeasuredPoints* m, const Mar
 #define CONTRADICTS_STRONGLY 4
 
 INLINE Opinions opinions_of(const TakeBackLimits* limits, const Witnesses* w, const MeasuredPoints* m, const Margins* margins, intv open) {
-  const int item = get_local_id(0), own = item % EVIDENCE_TEAM, team = item - own;
+  const int item = get_local_id(0), own = item % VIEW_TEAM, team = item - own;
   Opinions opinions = {0, 0, 0, 0};
-  for (int first = 0, turn = 0; first < w->view_count; first += EVIDENCE_TEAM, turn = 1 - turn) {
+  for (int first = 0, turn = 0; first < w->view_count; first += VIEW_TEAM, turn = 1 - turn) {
     __local uchar* said = w->told->said[turn];
     const intv asked = undecided(limits, &opinions, open);
     uchar opinion = 0;
@@ -232,7 +232,7 @@ INLINE Opinions opinions_of(const TakeBackLimits* limits, const Witnesses* w, co
     }
     said[item] = opinion;
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (int n = team; n < team + EVIDENCE_TEAM && undecided(limits, &opinions, open); ++n)
+    for (int n = team; n < team + VIEW_TEAM && undecided(limits, &opinions, open); ++n)
       add_opinions(MARK((said[n] & AGREES) != 0), MARK((said[n] & CONTRADICTS) != 0), MARK((said[n] & CONTRADICTS_STRONGLY) != 0),
                    &opinions);
   }
@@ -263,7 +263,7 @@ INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witn
 
 // Is it true for any work item of those that work together? All of the group must ask.
 INLINE bool any_of_group(bool own, __local Team* told) {
-#if EVIDENCE_TEAM == 1
+#if VIEW_TEAM == 1
   return own;
 #else
   if (get_local_id(0) == 0) told->any = 0;
@@ -294,15 +294,15 @@ __kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __globa
                              __global const int* taken_bricks, __global uchar* coarse) {
   __local Team told;
   const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height),
-            first = LANES * ((int)get_global_id(0) / EVIDENCE_TEAM);
-  if (EVIDENCE_TEAM == 1 && first >= pixels) return;
+            first = LANES * ((int)get_global_id(0) / VIEW_TEAM);
+  if (VIEW_TEAM == 1 && first >= pixels) return;
   const Witnesses w = {
       last_frames, images,     views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
       frame_count, view_count, &told};
   const intv n = first + lane_numbers(), row = quotients(n, columns);
   const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, TAKE_SQUARE * (n - row * columns), TAKE_SQUARE * row);
   const intv evidence = evidence_of(&f, &limits, &w, &m);
-  if (first >= pixels || get_global_id(0) % EVIDENCE_TEAM != 0) return;
+  if (first >= pixels || get_global_id(0) % VIEW_TEAM != 0) return;
   store_bytes(evidence, pixels - first, coarse + first);
 }
 
@@ -317,8 +317,8 @@ __kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __globa
                              __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
                              __global const int* taken_bricks, __global const uchar* coarse, __global uchar* evidence) {
   __local Team told;
-  const int chunks = chunks_of(f.grid.width), n = get_global_id(0) / EVIDENCE_TEAM, t = n / chunks, first = LANES * (n % chunks);
-  if (EVIDENCE_TEAM == 1 && t >= f.grid.height) return;
+  const int chunks = chunks_of(f.grid.width), n = get_global_id(0) / VIEW_TEAM, t = n / chunks, first = LANES * (n % chunks);
+  if (VIEW_TEAM == 1 && t >= f.grid.height) return;
   const int columns = coarse_size(f.grid.width), rows = coarse_size(f.grid.height), reach = TAKE_SQUARE / 2 + TAKE_GROWTH;
   bool near = false;
   for (int row = max(t - reach, 0) / TAKE_SQUARE; row <= min((t + reach) / TAKE_SQUARE, rows - 1); ++row)
@@ -333,7 +333,7 @@ __kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __globa
     m.measured &= near ? (intv)(-1) : (intv)(0);
     found = evidence_of(&f, &limits, &w, &m);
   }
-  if (t >= f.grid.height || get_global_id(0) % EVIDENCE_TEAM != 0) return;
+  if (t >= f.grid.height || get_global_id(0) % VIEW_TEAM != 0) return;
   store_bytes(found, f.grid.width - first, evidence + t * f.grid.width + first);
 }
 

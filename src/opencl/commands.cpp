@@ -45,7 +45,7 @@ std::string build_options(const Device& device) {
   return std::string("-cl-std=CL1.2") + (device.is_pocl && device.is_cpu ? " -Werror" : "") + rounding_option(device) +
          " -DLANES=" + std::to_string(device.lanes) + (device.is_cpu ? " -DON_CPU" : "") +
          " -DHEAVY_GROUP=" + std::to_string(shape_for(device).heavy_group) +
-         " -DEVIDENCE_TEAM=" + std::to_string(shape_for(device).evidence_team);
+         " -DTILE_GROUP=" + std::to_string(shape_for(device).tile_group) + " -DVIEW_TEAM=" + std::to_string(shape_for(device).view_team);
 }
 
 Commands::Commands(Device device) : device_(std::move(device)) {

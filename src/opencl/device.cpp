@@ -117,6 +117,7 @@ Device choose_device(const Config& config) {
     chosen.shares_memory = chosen.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() != 0;
     chosen.is_cpu = facts.type == "cpu";
     chosen.is_pocl = facts.platform == kPocl;
+    chosen.has_teams = !chosen.is_cpu;
     chosen.is_pocl_cpu = chosen.is_cpu && chosen.is_pocl;
     chosen.lanes = config.lanes != 0 ? config.lanes : chosen.is_pocl_cpu ? 16 : 1;
     facts.compute_units = chosen.device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();

@@ -6,12 +6,20 @@
 
 namespace frontier_surfels {
 
+std::size_t WorkShape::team(std::size_t jobs) const {
+  constexpr std::size_t kBusy = 1 << 18;  // work items
+  std::size_t team = view_team;
+  while (team > 1 && jobs * team > kBusy) team /= 2;
+  return team;
+}
+
 WorkShape shape_for(const Device& device) {
   WorkShape shape;
   shape.is_near = device.is_cpu && device.lanes != 1;
   shape.many_items = device.lanes == 1;
-  shape.heavy_group = device.is_pocl_cpu ? 1 : 64;
-  shape.evidence_team = shape.many_items && shape.heavy_group > 1 ? 16 : 1;
+  shape.heavy_group = device.is_pocl_cpu && !device.has_teams ? 1 : 64;
+  shape.tile_group = device.is_pocl_cpu ? 1 : 64;
+  shape.view_team = shape.many_items && device.has_teams ? 16 : 1;
   shape.view_items = shape.heavy_group == 1 ? 64 : 1 << 14;
   if (shape.many_items) {
     shape.scan_alone = 16;

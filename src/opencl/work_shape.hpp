@@ -17,7 +17,9 @@ struct WorkShape {
                                   ///< looks for what it wants in the device's memory, which is its own
   bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
-  std::size_t evidence_team = 1;  ///< work items that have a pixel together where most of the time is waiting for kept views' images
+  std::size_t tile_group = 1;     ///< and of settle_candidates, with its many barriers
+  std::size_t view_team = 1;      ///< at most so many work items have a pixel or a surfel together, where it mostly waits for the images of
+                                  ///< kept views
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
   std::size_t scan_by_group = 0;  ///< so many by one work-group
   std::size_t scan_group = 1;     ///< work items of this group
@@ -27,6 +29,9 @@ struct WorkShape {
   std::size_t sort_chunks = 64;   ///< otherwise so many work items sort them by block, each its share
   std::size_t sort_group = 1;     ///< in groups of so many
   std::size_t view_items = 64;    ///< work items that draw planners' views at a time
+
+  /// Work items that have each of so many jobs together: fewer where the jobs alone keep the device busy. A power of two.
+  std::size_t team(std::size_t jobs) const;
 };
 
 WorkShape shape_for(const Device& device);

@@ -23,11 +23,12 @@ void Creation::filter(const Frame& frame, const CandidateList& list, const Candi
 
 void Creation::create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
                       const ViewSettling& settling, const CandidateList& list, const BitField& leaving, SurfelMap& map) {
+  const std::size_t chunks = commands_.chunks(chosen_.room()), team = commands_.shape().team(chunks);
   new_.resize(chosen_.room());
-  commands_.run(kStage, "create_surfels", commands_.chunks(chosen_.room()), commands_.shape().heavy_group, frame, views.views(),
-                settling.tile_views()(), static_cast<cl_int>(views.view_groups()), views.depths(), camera.layer_depth()(), seen.slots(),
-                seen.tables(), seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), settling.tile_seen()(), chosen_(),
-                chosen_.length(), list.voxels()(), list.around()(), list.directions()(), new_.surfels(), new_.cells());
+  commands_.run(kStage, "create_surfels", chunks * team, commands_.shape().heavy_group, frame, views.views(), settling.tile_views()(),
+                static_cast<cl_int>(views.view_groups()), views.depths(), camera.layer_depth()(), seen.slots(), seen.tables(),
+                seen.brick_words(), taken.slots(), taken.tables(), taken.brick_words(), settling.tile_seen()(), chosen_(), chosen_.length(),
+                list.voxels()(), list.around()(), list.directions()(), static_cast<cl_int>(team), new_.surfels(), new_.cells());
   is_sorted_ = map.sort_early(kStage, {new_.cells, chosen_.length(), chosen_.room(), chosen_.count()}, leaving);
 }
 

@@ -165,7 +165,7 @@ void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
 template <typename... Images>
 void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
                        const SeenPoints& seen, const Images&... images) {
-  commands_.run(kStage, kernel, items * commands_.shape().evidence_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
+  commands_.run(kStage, kernel, items * commands_.shape().view_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
                 frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(),
                 seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), images...);
 }

@@ -7,7 +7,7 @@ namespace frontier_surfels {
 void ViewSettling::settle(const Frame& frame, const Camera& camera, RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
                           Candidates& candidates) {
   const int count = views.prepare();
-  const std::size_t columns = tile_columns(frame.grid), group = commands_.shape().heavy_group;
+  const std::size_t columns = tile_columns(frame.grid), group = commands_.shape().tile_group;
   const std::size_t groups = commands_.shape().many_items ? columns * WORD_TILES : columns;
   tile_views_.resize(std::max<std::size_t>(columns * WORD_TILES * views.view_groups(), 1));  // kernels take no empty buffer
   tile_seen_.resize(columns * WORD_TILES);

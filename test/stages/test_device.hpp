@@ -26,11 +26,11 @@ inline Config test_config() {
   return config;
 }
 
-/// With FRONTIER_SURFELS_TEST_GROUPS, the work is cut for other drivers than PoCL's, with barriers: also on PoCL, which compiles them
-/// slowly.
+/// With FRONTIER_SURFELS_TEST_GROUPS, work items have a pixel or a surfel together, as on a graphics processor: also on a CPU, which gains
+/// nothing by it.
 inline Device test_device() {
   Device device = choose_device(test_config());
-  if (std::getenv("FRONTIER_SURFELS_TEST_GROUPS") != nullptr) device.is_pocl_cpu = false;
+  if (std::getenv("FRONTIER_SURFELS_TEST_GROUPS") != nullptr) device.has_teams = true;
   return device;
 }
 
