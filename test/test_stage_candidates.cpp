@@ -20,7 +20,7 @@ void check(const CameraSetup& camera, double observed_density) {
   fixture.write(observed_bits, observed);
   Candidates found(fixture.commands());
   found.visit_counts().write(std::vector<cl_uint>(COUNTS, 5));
-  found.find(fixture.frame(), observed_bits);
+  found.find(fixture.camera().grid(), observed_bits);
   expect_equal("candidates", candidates(observed), fixture.read(found));
   EXPECT_EQ(found.visit_counts().read(COUNTS), std::vector<cl_uint>(COUNTS, 0)) << "the next stage's counters are not cleared";
 }

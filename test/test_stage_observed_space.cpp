@@ -15,7 +15,7 @@ void check(const CameraSetup& camera, const WorkingImage& image) {
   FrameFixture fixture(camera.config);
   fixture.begin(image, Eigen::Isometry3d::Identity());
   ObservedSpace observed(fixture.commands());
-  observed.compute(fixture.frame(), fixture.camera());
+  observed.compute(fixture.camera());
   const Nuvg grid(camera.intrinsics, camera.config);
   ASSERT_EQ(fixture.grid().size_i, grid.size_i);
   ASSERT_EQ(fixture.grid().size_j, grid.size_j);

@@ -113,7 +113,7 @@ std::vector<ViewSurfel> put_into_map(const CameraSetup& camera, FrameFixture& fi
   column_end.write(std::vector<cl_int>(camera.intrinsics.width * camera.intrinsics.height, 0));
   Candidates candidates(commands);
   SurfelVisit visit(commands);
-  candidates.find(fixture.frame(), observed);
+  candidates.find(fixture.camera().grid(), observed);
   visit.visit(fixture.frame(), fixture.camera(), observed, column_end, fixture.views(), fixture.taken(), fixture.map(), candidates);
   view_surfels.place(fixture.frame(), visit.in_view(), fixture.map());
   for (const ViewSurfel& placed : view_surfels.surfels().read(view_surfels.count())) {

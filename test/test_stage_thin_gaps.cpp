@@ -91,7 +91,7 @@ Scene prepare(CameraSetup camera, const Setup& setup, double observed_density, G
   }
   scene.current = {random_image(camera, setup.content, random), T_world_start, depth_step};
   fixture.begin(scene.current.image, T_world_start);
-  fixture.space.compute(fixture.frame(), fixture.camera());  // gives the ends of the columns
+  fixture.space.compute(fixture.camera());  // gives the ends of the columns
   scene.observed = observed_density >= 0 ? random_field(fixture.grid(), observed_density, random) : fixture.read(fixture.space.bits());
   fixture.write(fixture.observed, scene.observed);
   scene.layer_depth = fixture.layer_depth();

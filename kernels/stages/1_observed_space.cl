@@ -9,20 +9,20 @@
 //   in  depth[height][width] [m];  layer_depth[size_k]: z of each layer's centre [m], ascending
 //   out column_end[height][width]: layers first_pyramid_layer ... column_end - 1 are observed; 0 where there is no measurement
 //       valid[height][image_words]: a bit for each pixel that is valid; at width 1 zero before
-__kernel void column_ends(const Frame f, __global const float* depth, __global const float* layer_depth, __global int* column_end,
+__kernel void column_ends(const Grid g, __global const float* depth, __global const float* layer_depth, __global int* column_end,
                           __global uint* valid) {
-  const int chunks_in_row = 32 / LANES * image_words(&f.grid), row = get_global_id(0) / chunks_in_row,
+  const int chunks_in_row = 32 / LANES * image_words(&g), row = get_global_id(0) / chunks_in_row,
             first = LANES * (get_global_id(0) % chunks_in_row);
-  if (row >= f.grid.height) return;
-  const intv column = first + lane_numbers(), pixel = row * f.grid.width + min(column, f.grid.width - 1);
+  if (row >= g.height) return;
+  const intv column = first + lane_numbers(), pixel = row * g.width + min(column, g.width - 1);
   const floatv d = fabs(gather_float(depth, pixel));
-  const intv is_valid = MARK((d > 0.0f) & (column < f.grid.width));
-  intv end = clamp(ceil_int(layers_at(&f.grid, d)), 0, f.grid.size_k);  // z(end - 1) < d <= z(end), but for rounding
+  const intv is_valid = MARK((d > 0.0f) & (column < g.width));
+  intv end = clamp(ceil_int(layers_at(&g, d)), 0, g.size_k);  // z(end - 1) < d <= z(end), but for rounding
   end += MARK((end > 0) & (gather_float(layer_depth, max(end - 1, 0)) >= d));
-  end -= MARK((end < f.grid.size_k) & (gather_float(layer_depth, min(end, f.grid.size_k - 1)) < d));
+  end -= MARK((end < g.size_k) & (gather_float(layer_depth, min(end, g.size_k - 1)) < d));
   end = is_valid ? end : 0;
   store_lane_bits(lane_bits(is_valid), get_global_id(0), valid);
-  store_first(end, f.grid.width - first, column_end + row * f.grid.width + first);
+  store_first(end, g.width - first, column_end + row * g.width + first);
 }
 
 // Bits below bit n of a word of 32, n in 0 ... 32.
@@ -80,35 +80,35 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
 //       These tables have the cuboid's layers, filled up to whole words, and voxels filled up to whole chunks of TABLE_CHUNK.
 //   out observed: bit field
 #if LANES == 1
-__kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
+__kernel void observed_space(const Grid g, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
-  const int parts = 2 * f.grid.words_k, i = get_global_id(0) % f.grid.size_i, part = get_global_id(0) / f.grid.size_i % parts,
-            j = get_global_id(0) / f.grid.size_i / parts;
-  if (j >= f.grid.size_j) return;
+  const int parts = 2 * g.words_k, i = get_global_id(0) % g.size_i, part = get_global_id(0) / g.size_i % parts,
+            j = get_global_id(0) / g.size_i / parts;
+  if (j >= g.size_j) return;
   uint bits = 0;
-  if (32 * part < f.grid.first_pyramid_layer) observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, 1, 32 * part, &bits);
-  bits |= observe_pyramid(&f.grid, ends_of_columns(&f.grid, column_end, i, j), 32 * part);
-  bits &= (uint)(valid_layers(&f.grid, part / 2) >> (32 * (part % 2)));
-  ((__global uint*)observed)[2 * word_index(&f.grid, i, j, part / 2) + part % 2] = bits;
+  if (32 * part < g.first_pyramid_layer) observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, 1, 32 * part, &bits);
+  bits |= observe_pyramid(&g, ends_of_columns(&g, column_end, i, j), 32 * part);
+  bits &= (uint)(valid_layers(&g, part / 2) >> (32 * (part % 2)));
+  ((__global uint*)observed)[2 * word_index(&g, i, j, part / 2) + part % 2] = bits;
 }
 #else
-__kernel void observed_space(const Frame f, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
+__kernel void observed_space(const Grid g, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
-  const int chunks = chunks_of(f.grid.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % f.grid.words_k,
-            j = SPACE_ROWS * (get_global_id(0) / chunks / f.grid.words_k);
-  if (j >= f.grid.size_j) return;
+  const int chunks = chunks_of(g.size_i), i = LANES * (get_global_id(0) % chunks), w = get_global_id(0) / chunks % g.words_k,
+            j = SPACE_ROWS * (get_global_id(0) / chunks / g.words_k);
+  if (j >= g.size_j) return;
   uintv low[SPACE_ROWS], high[SPACE_ROWS];
   for (int n = 0; n < SPACE_ROWS; ++n) low[n] = high[n] = 0;
-  if (64 * w < f.grid.first_pyramid_layer) {
-    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w, low);
-    observe_cuboid(&f.grid, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w + 32, high);
+  if (64 * w < g.first_pyramid_layer) {
+    observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w, low);
+    observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, SPACE_ROWS, 64 * w + 32, high);
   }
-  for (int n = 0; n < SPACE_ROWS && j + n < f.grid.size_j; ++n) {
-    const intv ends = ends_of_columns(&f.grid, column_end, i, j + n);
-    low[n] |= observe_pyramid(&f.grid, ends, 64 * w);
-    high[n] |= observe_pyramid(&f.grid, ends, 64 * w + 32);
-    const ulongv words = (convert_ulongv(high[n]) << 32 | convert_ulongv(low[n])) & valid_layers(&f.grid, w);
-    store_first(words, f.grid.size_i - i, observed + word_index(&f.grid, i, j + n, w));
+  for (int n = 0; n < SPACE_ROWS && j + n < g.size_j; ++n) {
+    const intv ends = ends_of_columns(&g, column_end, i, j + n);
+    low[n] |= observe_pyramid(&g, ends, 64 * w);
+    high[n] |= observe_pyramid(&g, ends, 64 * w + 32);
+    const ulongv words = (convert_ulongv(high[n]) << 32 | convert_ulongv(low[n])) & valid_layers(&g, w);
+    store_first(words, g.size_i - i, observed + word_index(&g, i, j + n, w));
   }
 }
 #endif

@@ -6,23 +6,23 @@
 //   in  observed: bit field C~, with SPARE_WORDS behind it
 //   out candidates: bit field by tiles, of all their columns; voxels with a surfel that stays are among them
 //       counts[COUNTS]: 0, for what 5_visit counts next
-__kernel void find_candidates(const Frame f, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
+__kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
   if (get_global_id(0) < COUNTS) counts[get_global_id(0)] = 0;
-  const int chunks = chunks_of(VIEW_TILE * grid_tiles(f.grid.size_i)), i = LANES * (get_global_id(0) % chunks),
-            w = get_global_id(0) / chunks % f.grid.words_k, j = get_global_id(0) / chunks / f.grid.words_k;
-  if (j >= VIEW_TILE * grid_tiles(f.grid.size_j)) return;
+  const int chunks = chunks_of(VIEW_TILE * grid_tiles(g.size_i)), i = LANES * (get_global_id(0) % chunks),
+            w = get_global_id(0) / chunks % g.words_k, j = get_global_id(0) / chunks / g.words_k;
+  if (j >= VIEW_TILE * grid_tiles(g.size_j)) return;
   ulongv found = 0;
-  if (j < f.grid.size_j) {
-    __global const ulong* own = observed + word_index(&f.grid, i, j, w);
+  if (j < g.size_j) {
+    __global const ulong* own = observed + word_index(&g, i, j, w);
     const ulongv here = vloadv(0, own);
-    const intv columns = i + lane_numbers(), exist = MARK(columns < f.grid.size_i), has_next = MARK(columns + 1 < f.grid.size_i);
+    const intv columns = i + lane_numbers(), exist = MARK(columns < g.size_i), has_next = MARK(columns + 1 < g.size_i);
     ulongv beside = here << 1 | here >> 1 | (vloadv(0, own + 1) & as_ulongv(convert_longv(has_next)));
     beside |= i > 0 ? vloadv(0, own - 1) : from_lane_before(here);
-    if (w > 0) beside |= vloadv(0, own - f.grid.size_i) >> 63;
-    if (w + 1 < f.grid.words_k) beside |= vloadv(0, own + f.grid.size_i) << 63;
-    if (j > 0) beside |= vloadv(0, own - f.grid.words_k * f.grid.size_i);
-    if (j + 1 < f.grid.size_j) beside |= vloadv(0, own + f.grid.words_k * f.grid.size_i);
-    found = beside & ~here & valid_layers(&f.grid, w) & as_ulongv(convert_longv(exist));
+    if (w > 0) beside |= vloadv(0, own - g.size_i) >> 63;
+    if (w + 1 < g.words_k) beside |= vloadv(0, own + g.size_i) << 63;
+    if (j > 0) beside |= vloadv(0, own - g.words_k * g.size_i);
+    if (j + 1 < g.size_j) beside |= vloadv(0, own + g.words_k * g.size_i);
+    found = beside & ~here & valid_layers(&g, w) & as_ulongv(convert_longv(exist));
   }
-  store_runs_of_8(found, candidates + tile_word_index(&f.grid, i, j, w), TILE_COLUMNS, i + VIEW_TILE < f.grid.size_i);
+  store_runs_of_8(found, candidates + tile_word_index(&g, i, j, w), TILE_COLUMNS, i + VIEW_TILE < g.size_i);
 }

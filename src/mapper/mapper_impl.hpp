@@ -96,8 +96,7 @@ struct Mapper::Impl {
   Report integrate(const DepthFrame& input);
   Report update(const DepthFrame& input);
   std::uint64_t stage_times_every() const;
-  Frame begin_frame(const std::shared_ptr<const WorkingImage>& image, const Eigen::Isometry3d& T_world_camera, Camera& camera,
-                    std::uint32_t number);
+  Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   double seen_spacing(const Camera& camera) const;
   SurfelVisit::Found propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);

@@ -56,13 +56,17 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
 
+  begin_call();
+  remember_forgotten();
+
+  // Observed space C~ - 3.3, eq. (9)-(11). It needs no pose: the device finds it while the host corrects the pose
+  camera.set_image(shared_image);
+  observed.compute(camera);
+
   // Pose correction - ours: the jitter of the recorded poses is taken out
   const CorrectedPose pose = pose_correction.correct(image, input.T_world_camera);
   report.T_world_camera = pose.T_world_camera;
-  Frame frame = begin_frame(shared_image, pose.T_world_camera, camera, number);
-
-  // Observed space C~ - 3.3, eq. (9)-(11)
-  observed.compute(frame, camera);
+  Frame frame = begin_frame(image, pose.T_world_camera, camera, number);
 
   // Taking back - ours: is there evidence that space behind measured surfaces, which was known, is unknown again?
   taking_back.look(camera, views, seen, &frame);
@@ -91,15 +95,11 @@ std::uint64_t Mapper::Impl::stage_times_every() const {
   return commands.device().is_cpu ? 1 : kSeldom;
 }
 
-Frame Mapper::Impl::begin_frame(const std::shared_ptr<const WorkingImage>& image, const Eigen::Isometry3d& T_world_camera, Camera& camera,
-                                std::uint32_t number) {
-  begin_call();
-  remember_forgotten();
+Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.maps(), sequence);
   if (archive) fetch_blocks(camera, T_world_camera, number);
   map.open_window(camera.grid(), T_world_camera);
-  camera.set_image(image);
-  views.set_current(*image, T_world_camera);
+  views.set_current(image, T_world_camera);
   seen.choose_spacing(seen_spacing(camera));
   seen.open_window(map.window());
   taking_back.open_window(map.window(), seen);
@@ -125,7 +125,7 @@ SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Came
   for (;;) {
     // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
     // surviving surfel needs no new one
-    candidates.find(frame, observed.bits());
+    candidates.find(camera.grid(), observed.bits());
     visit.visit(frame, camera, observed.bits(), observed.column_end(), views, taking_back.taken(), map, candidates);
 
     // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours

@@ -7,12 +7,11 @@ Candidates::Candidates(Commands& commands) : commands_(commands), candidates_(co
   visit_counts_.fill("candidates", 0, COUNTS);
 }
 
-void Candidates::find(const Frame& frame, const BitField& observed) {
-  const Grid& g = frame.grid;
+void Candidates::find(const Grid& g, const BitField& observed) {
   candidates_.allocate(words(g));
   const std::size_t rows = VIEW_TILE * tiles(g.size_j);
-  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, frame,
-                observed(), candidates_(), visit_counts_());
+  commands_.run("candidates", "find_candidates", commands_.chunks(VIEW_TILE * tiles(g.size_i)) * g.words_k * rows, kGroup, g, observed(),
+                candidates_(), visit_counts_());
 }
 
 CandidateList::CandidateList(Commands& commands, Lists& lists)

@@ -12,7 +12,7 @@ class Candidates {
   explicit Candidates(Commands& commands);
 
   /// Finds the unobserved voxels beside observed ones. Voxels with a surfel are among them until SurfelVisit clears them.
-  void find(const Frame& frame, const BitField& observed);
+  void find(const Grid& g, const BitField& observed);
 
   static std::size_t words(const Grid& grid) { return VIEW_TILE * VIEW_TILE * tile_columns(grid); }
   const BitField& bits() const { return candidates_; }

@@ -10,7 +10,7 @@ class ObservedSpace {
   explicit ObservedSpace(Commands& commands);
 
   /// @param camera  the frame's camera, with its image
-  void compute(const Frame& frame, const Camera& camera);
+  void compute(const Camera& camera);
 
   const BitField& bits() const { return observed_; }  ///< C~, a bit for each voxel; SPARE_WORDS more words can be read
 

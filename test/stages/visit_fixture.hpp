@@ -20,12 +20,12 @@ struct VisitFixture : FrameFixture {
   /// Begins a frame with its own observed space and candidates.
   void begin_and_observe(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) {
     begin(image, T_world_camera);
-    space.compute(frame(), camera());
+    space.compute(camera());
     find_candidates(space.bits());
   }
 
   /// @param with  observed space; the ends of columns always come from the image
-  void find_candidates(const BitField& with) { candidates.find(frame(), with); }
+  void find_candidates(const BitField& with) { candidates.find(camera().grid(), with); }
 
   SurfelVisit::Found look(const BitField& with) {
     visit.visit(frame(), camera(), with, space.column_end(), views(), taken(), map(), candidates);
