@@ -57,7 +57,8 @@ SeenPoints::SeenPoints(Commands& commands, double block_size)
       gathered_list_(commands) {
   clear();
   send_entries("changes");
-  slots_.send(std::vector<cl_int>{0});
+  window_tables_ = std::make_shared<const std::vector<cl_int>>(1, 0);
+  slots_.send(window_tables_);
 }
 
 /// The device gets it with the next send_entries().
@@ -102,12 +103,13 @@ double SeenPoints::spacing() const { return block_size_ / (SEEN_BRICK << shift_)
 
 void SeenPoints::open_window(const MapWindow& window) {
   send_entries("remembering");
-  std::vector<cl_int> slots(window.cells(), 0);
+  auto tables = std::make_shared<std::vector<cl_int>>(window.cells(), 0);
   for (int cell = 0; cell < window.cells(); ++cell) {
     const auto found = table_of_.find(window.block(cell));
-    if (found != table_of_.end()) slots[cell] = found->second;
+    if (found != table_of_.end()) (*tables)[cell] = found->second;
   }
-  slots_.send(std::move(slots));
+  window_tables_ = std::move(tables);
+  slots_.send(window_tables_);
 }
 
 int SeenPoints::table(const BlockKey& block) {

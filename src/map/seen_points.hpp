@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -50,6 +51,9 @@ class SeenPoints {
 
   /// Sends the tables of a window's blocks, for questions about points in it, and what send_entries() has not sent yet.
   void open_window(const MapWindow& window);
+
+  /// Number of the table of a cell of the window that was opened last; 0: it has none.
+  int window_table(int cell) const { return (*window_tables_)[cell]; }
 
   /// Number of a block's table; made if the block has none.
   int table(const BlockKey& block);
@@ -121,15 +125,16 @@ class SeenPoints {
   int shift_ = 2;
   bool fixed_ = false;  ///< by choose_shift(), or because something has been remembered
   std::unordered_map<BlockKey, int> table_of_;
-  std::vector<cl_int> tables_;          ///< the device's tables; the host is their master
-  std::vector<int> full_bricks_;        ///< of each table: number of entries that are SEEN_BRICK_FULL
-  std::vector<int> free_tables_;        ///< of blocks that were dropped; the last one is used next
-  std::vector<cl_int> free_;            ///< bricks that no entry has; the last one is used next
-  std::size_t used_ = 2;                ///< one past the last brick ever used; the first two stand for uniform bricks
-  std::size_t sent_tables_ = 0;         ///< entries that the device has
-  std::vector<cl_int> changed_places_;  ///< entries of the tables that the device does not have yet
-  std::vector<cl_int> new_bricks_;      ///< bricks that the device has not emptied yet
-  SentArray<cl_int> slots_;
+  std::vector<cl_int> tables_;                                ///< the device's tables; the host is their master
+  std::vector<int> full_bricks_;                              ///< of each table: number of entries that are SEEN_BRICK_FULL
+  std::vector<int> free_tables_;                              ///< of blocks that were dropped; the last one is used next
+  std::vector<cl_int> free_;                                  ///< bricks that no entry has; the last one is used next
+  std::size_t used_ = 2;                                      ///< one past the last brick ever used; the first two stand for uniform bricks
+  std::size_t sent_tables_ = 0;                               ///< entries that the device has
+  std::vector<cl_int> changed_places_;                        ///< entries of the tables that the device does not have yet
+  std::vector<cl_int> new_bricks_;                            ///< bricks that the device has not emptied yet
+  std::shared_ptr<const std::vector<cl_int>> window_tables_;  ///< of each cell of the window that was opened last
+  SentArray<cl_int> slots_;                                   ///< the same
   SentArray<cl_int2> entries_;
   SentArray<cl_int> new_bricks_list_;
   DeviceArray<cl_int> tables_on_device_;

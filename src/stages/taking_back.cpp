@@ -83,14 +83,14 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
   if (count == 0 && taken_.empty()) return pixels_;
   const std::vector<cl_uchar> chosen = count > 0 ? chosen_.read(image.depth.size()) : std::vector<cl_uchar>();
   pixels_ = std::max(pixels_, count);  // before anything is changed
-  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen);
+  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, chosen, bricks_with_points(window));
   if (!bricks.empty()) {
     change_bricks(*frame, camera, views, window, count > 0, std::move(bricks));
     commands_.wait();
     settle_bricks();
     taken_.open_window(window);
   }
-  frame->has_taken = has_points(window) ? 1 : 0;
+  frame->has_taken = bricks_with_points(window).empty() ? 0 : 1;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
 }
@@ -98,12 +98,13 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
 std::size_t TakingBack::give_back(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views,
                                   Frame* frame) {
   if (!has_taken()) return pixels_;
-  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, {});
+  const std::vector<Brick> with_points = bricks_with_points(window);
+  std::vector<Brick> bricks = bricks_to_change(*frame, window, image, {}, with_points);
   if (!bricks.empty()) {
     change_bricks(*frame, camera, views, window, false, std::move(bricks));
     taken_.open_window(window);
   }
-  frame->has_taken = has_points(window) ? 1 : 0;
+  frame->has_taken = with_points.empty() ? 0 : 1;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
 }
@@ -114,21 +115,15 @@ bool TakingBack::must_update() {
   return chosen_count_now_->front() > 0;
 }
 
-/// Has any brick of the window taken points?
-bool TakingBack::has_points(const MapWindow& window) {
-  for (int cell = 0; cell < window.cells(); ++cell)
-    if (taken_.has_table(window.block(cell)) && !taken_.bricks_with_points(taken_.table(window.block(cell))).empty()) return true;
-  return false;
-}
-
 /// The bricks of the window that have taken points.
-std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& window) {
+std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& window) const {
+  if (taken_.empty()) return {};  // then the window is not opened
   const int sides = 1 << taken_.shift();
   const Window& w = window.window();
   std::vector<Brick> bricks;
   for (int cell = 0; cell < window.cells(); ++cell) {
-    if (!taken_.has_table(window.block(cell))) continue;
-    const int table = taken_.table(window.block(cell));
+    const int table = taken_.window_table(cell);
+    if (table == 0) continue;
     for (const int brick : taken_.bricks_with_points(table))
       bricks.push_back({table,
                         brick,
@@ -222,11 +217,11 @@ std::vector<TakingBack::Place> TakingBack::places_behind(const Grid& g, const Ma
 
 /// The bricks of the window with taken points of which this frame may see something, and those that may get some behind chosen pixels.
 std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
-                                                            const std::vector<cl_uchar>& chosen) {
+                                                            const std::vector<cl_uchar>& chosen, const std::vector<Brick>& with_points) {
   const std::vector<Place> behind = places_behind(frame.grid, window, image, chosen);
   const double brick_size = SEEN_BRICK * taken_.spacing();
   std::vector<Brick> bricks;
-  for (const Brick& brick : bricks_with_points(window)) {
+  for (const Brick& brick : with_points) {
     const Place place = {brick.place.s[0], brick.place.s[1], brick.place.s[2]};
     const Eigen::Vector3d middle = Eigen::Vector3d(place[0], place[1], place[2]).array() + 0.5;
     if (!std::binary_search(behind.begin(), behind.end(), place) &&

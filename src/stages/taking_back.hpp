@@ -89,14 +89,13 @@ class TakingBack {
 
   using Place = std::array<int, 3>;  ///< x, y, z, counted in bricks from the window's corner
 
-  bool has_points(const MapWindow& window);
-  std::vector<Brick> bricks_with_points(const MapWindow& window);
+  std::vector<Brick> bricks_with_points(const MapWindow& window) const;
   std::vector<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
                                    const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
   void find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen);
   std::vector<Brick> bricks_to_change(const Frame& frame, const MapWindow& window, const WorkingImage& image,
-                                      const std::vector<cl_uchar>& chosen);
+                                      const std::vector<cl_uchar>& chosen, const std::vector<Brick>& with_points);
   void change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
                      std::vector<Brick> bricks);
   void settle_bricks();
