@@ -80,7 +80,7 @@ foreach(source ${TEST_SOURCES})
       ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE};FRONTIER_SURFELS_TEST_LANES=1" TIMEOUT 600)
   endif()
   # The kernels in which work items wait for each other at barriers that PoCL compiles within seconds.
-  if(name MATCHES "^test_stage_(creation|evidence|thin_gaps)$")
+  if(name MATCHES "^test_stage_(creation|evidence|taken_points|taking_back|thin_gaps)$")
     add_test(NAME ${name}_groups COMMAND ${target})
     set_tests_properties(${name}_groups PROPERTIES
       ENVIRONMENT "POCL_CACHE_DIR=${POCL_CACHE};FRONTIER_SURFELS_TEST_LANES=1;FRONTIER_SURFELS_TEST_GROUPS=1" TIMEOUT 600)

@@ -27,7 +27,7 @@ void expect_at_most(const Trips& trips, const Trips& most) {
   EXPECT_LE(trips.uploads, most.uploads);
 }
 
-/// Frames in which surfels were split, space was taken back, now or earlier, or blocks were added to the memory of seen points take more,
+/// Frames in which surfels were split, space was taken back, or blocks were added to the memory of seen points take more,
 /// and are left out; so are those with many more candidates than the frame before.
 /// @return number of frames that were compared
 /// @param timed_every  Config::stage_times_every

@@ -93,5 +93,17 @@ TEST_F(StageCommands, WritesAndReadsKeepTheirOrder) {
   EXPECT_EQ(*second, wanted);
 }
 
+/// Fewer work items share a job where there are more jobs.
+TEST(WorkShape, Teams) {
+  WorkShape shape;
+  EXPECT_EQ(shape.team(1), 1U);
+  shape.view_team = 16;
+  for (const std::size_t few : {0, 1, 1 << 14}) EXPECT_EQ(shape.team(few), 16U);
+  EXPECT_EQ(shape.team((1 << 14) + 1), 8U);
+  EXPECT_EQ(shape.team(1 << 17), 2U);
+  EXPECT_EQ(shape.team((1 << 17) + 1), 1U);
+  EXPECT_EQ(shape.team(1 << 30), 1U);
+}
+
 }  // namespace
 }  // namespace frontier_surfels

@@ -168,6 +168,47 @@ TEST(StageTakingBack, PointsTakenBefore) {
   EXPECT_GT(tally.stayed, 1000u);
 }
 
+/// Whether the host waits for the answer at once or later, the same points are taken, with bricks of every kind.
+TEST(StageTakingBack, WhenTheHostAsksDoesNotMatter) {
+  std::size_t with_chosen = 0, without = 0;
+  for (const CameraSetup& camera : some_cameras())
+    for (unsigned seed = 0; seed < 6; ++seed) {
+      SCOPED_TRACE(camera.name + ", seed " + std::to_string(seed));
+      std::vector<std::size_t> counts[2];
+      std::vector<SeenSpace> saved[2];
+      std::vector<BlockKey> changed[2];
+      for (const bool ask_first : {false, true}) {
+        Random random(seed);
+        TakingBackFixture fixture(camera.config);
+        const TwoScenes scenes = random_scenes(camera, random);
+        play(fixture, scenes, camera, random);
+        SeenPoints& taken = fixture.taking.taken();
+        const double share = seed % 2 == 0 ? 0.2 : 0.02;  // where much is taken, nothing more is
+        fill_lattice(taken, fixture.map().window(), share, share, random);
+        fixture.open_window();
+        for (int frame = 0; frame < 3; ++frame) {
+          if (frame > 0) fixture.start(scenes, frame == 1, camera, random);
+          counts[ask_first].push_back(fixture.update(ask_first));
+          saved[ask_first].push_back(taken.saved());
+          expect_no_spare_bricks(taken);
+          fixture.end(false);
+        }
+        changed[ask_first] = fixture.taking.take_changed();
+        std::sort(changed[ask_first].begin(), changed[ask_first].end());
+        changed[ask_first].erase(std::unique(changed[ask_first].begin(), changed[ask_first].end()), changed[ask_first].end());
+      }
+      EXPECT_EQ(counts[0], counts[1]);
+      EXPECT_EQ(changed[0], changed[1]);
+      for (std::size_t frame = 0; frame < saved[0].size(); ++frame) {
+        ASSERT_EQ(saved[0][frame].blocks.size(), saved[1][frame].blocks.size());
+        for (std::size_t n = 0; n < saved[0][frame].blocks.size(); ++n)
+          EXPECT_EQ(saved[0][frame].blocks[n].bytes, saved[1][frame].blocks[n].bytes);
+        ++(counts[0][frame] > 0 ? with_chosen : without);
+      }
+    }
+  EXPECT_TRUE((with_chosen > 2 && without > 2) || small_tests()) << "nothing was tested";
+}
+
 /// A board before a wall: all that is taken behind it lies before the wall.
 TwoScenes board_before_wall(const CameraSetup& camera) {
   const Eigen::AlignedBox2d everywhere(Eigen::Vector2d(-50, -50), Eigen::Vector2d(50, 50)),

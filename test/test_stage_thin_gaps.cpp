@@ -146,6 +146,13 @@ TEST(StageThinGaps, RandomViews) {
   }
 }
 
+/// More than a group of them, of which each work item of a team has its share.
+TEST(StageThinGaps, ManyViews) {
+  Tally tally;
+  for (const int frames : {17, 40}) tally += check(cameras().front(), {0.1, frames, 50, Content::mixed, kSurfaceDepth}, 0.2, true);
+  EXPECT_GT(tally.by_kept, small_tests() ? 0u : 20u) << "nothing was tested";
+}
+
 /// The frame's own C~ and the candidates beside it.
 TEST(StageThinGaps, CandidatesOfTheFrame) {
   Tally tally;

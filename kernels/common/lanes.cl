@@ -1,10 +1,10 @@
 // LANES points at once: one source for two widths.
 //
 // A work item handles LANES points, surfels, voxels or views. LANES is set when the program is built: 16 on a CPU with PoCL, which uses its
-// vectors that way, and 1 on other devices, which have a work item for each point. So is HEAVY_GROUP, the number of work items in a group
-// of the kernels with much work per item. floatv, intv, uintv and ulongv hold one number for each of the LANES: they are vectors of 16, or
-// plain numbers. convert_..., as_..., vloadv and vstorev do for them what OpenCL's functions do for its types. Only this file depends on
-// the width.
+// vectors that way, and 1 on other devices, which have a work item for each point. So are HEAVY_GROUP and TILE_GROUP, the numbers of work
+// items in groups of the kernels with much work per item, and VIEW_TEAM (src/opencl/work_shape.hpp). floatv, intv, uintv and ulongv hold
+// one number for each of the LANES: they are vectors of 16, or plain numbers. convert_..., as_..., vloadv and vstorev do for them what
+// OpenCL's functions do for its types. Only this file depends on the width.
 //
 // A mark says yes or no for each lane: an intv whose lanes are -1 or 0. Marks are joined by & | ~, and `mark ? a : b` chooses lane by lane.
 // Comparisons of vectors give -1 or 0, but comparisons of plain numbers give 1 or 0. A comparison that becomes a mark is therefore written

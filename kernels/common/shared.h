@@ -306,7 +306,7 @@ typedef struct {
   Transform T_camera_local, T_local_camera;  // local: the window's frame
   View own_view;                             // of this frame, as its own camera sees it
   SHARED_INT has_color;
-  SHARED_INT has_seen, has_taken;  // is any point of the lattice seen?  is any taken back?
+  SHARED_INT has_seen, has_taken;  // is any point of the lattice seen?  may any be taken back?
   SHARED_INT takes_back;           // does this frame take space back?
   SHARED_INT seen_shift;           // log2 of the bricks along a block's edge
 } Frame;

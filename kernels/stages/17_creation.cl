@@ -55,7 +55,8 @@ INLINE Points slide_to_boundary(const Frame* f, ViewsAround* around, const SeenP
   for (int n = 0; n < SLIDE_STEPS && must_ask(open); ++n) {
     intv known = any_view_knows(around, depths, add_scaled(center, convert_floatv(steps + 1), forward), open);
     known |= any_view_knows(around, depths, add_scaled(center, convert_floatv(steps), forward), open & ~known);
-    if (ask_seen) known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
+    if (ask_seen && any_lane(open & ~known))
+      known |= seen_before(f, seen, add_scaled(center, convert_floatv(steps), forward), open & ~known);
     steps += known;
     open = known & MARK(steps > 0);
   }

@@ -21,8 +21,8 @@ INLINE intv behind_chosen(const Grid* g, const TakeBackLimits* limits, const Vie
   return lane_marks(marks);
 }
 
-// One work item handles a cube of words of a brick, as see_points does. Without has_chosen it is launched before the host knows whether any
-// pixel was chosen: if so, nothing is done here, because the host launches it again with more bricks.
+// One work item handles a cube of words of a brick, as see_points does. Without has_chosen it may be launched before the host knows whether
+// any pixel was chosen: if any was, nothing is done here, because the host launches it again with more bricks.
 //   in  own_view: from the window's frame to this frame's image;  depths: its image, as views keep it
 //       depth, chosen [height][width]: of this frame;  chosen_count: of choose_pixels
 //       taken_by[count]: x, y, z of a brick, counted in bricks from the window's corner, and its number

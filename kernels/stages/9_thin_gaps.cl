@@ -64,8 +64,8 @@ intv any_view_knows(ViewsAround* around, __global const ushort* depths, Points p
   return asked & ~open;
 }
 #else
-// Where `team` work items have a candidate together, each asks its share of every group of views. All of the work-group must call these: it
-// goes on where any of it has a candidate, and those beyond the last one repeat it.
+// Where `team` work items have a candidate together, each asks its share of every group of views. All of a work-group must call these. A
+// group returns only as a whole, if none of its teams has a candidate; teams beyond the last candidate repeat that one and write nothing.
 INLINE bool find_chunk(int count, int team, int* chunk, bool* writes) {
   const int own = (int)get_global_id(0) / team;
   *chunk = max(min(own, count - 1), 0);

@@ -52,12 +52,11 @@ class SeenPoints {
   /// Sends the tables of a window's blocks, for questions about points in it, and what send_entries() has not sent yet.
   void open_window(const MapWindow& window);
 
-  /// Number of the table of a cell of the window that was opened last; 0: it has none.
+  /// Number of the table of a cell of the window that was opened last, if no block was dropped since; 0: it has none.
   int window_table(int cell) const { return (*window_tables_)[cell]; }
 
   /// Number of a block's table; made if the block has none.
   int table(const BlockKey& block);
-  bool has_table(const BlockKey& block) const { return table_of_.count(block) != 0; }
   cl_int entry(int table, int brick) const { return tables_[at(table, brick)]; }
   std::vector<int> bricks_with_points(int table) const;  ///< those of a block of which any point is seen
   int bricks_of_block() const { return 1 << (3 * shift_); }

@@ -62,6 +62,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Observed space C~ - 3.3, eq. (9)-(11). It needs no pose: the device finds it while the host corrects the pose
   camera.set_image(shared_image);
   observed.compute(camera);
+  commands.start();
 
   // Pose correction - ours: the jitter of the recorded poses is taken out
   const CorrectedPose pose = pose_correction.correct(image, input.T_world_camera);
@@ -115,7 +116,9 @@ double Mapper::Impl::seen_spacing(const Camera& camera) const {
 /// The device does all of it before the host asks what has come of it. In few frames it has to be done again: surfels were too large, space
 /// is taken back, or there were far more candidates than in the last frame.
 SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
-  bool is_judged = taking_back.is_likely();  // the evidence for taking back
+  // Does this frame take space back? If one of the frames just before it did, the host waits for the answer at once. Else the frame goes on
+  // as if it did not
+  bool is_judged = taking_back.is_likely();
   const auto judge = [&] { report.taken_back = taking_back.update(camera, map.window(), image, views, &frame); };
   if (is_judged)
     judge();

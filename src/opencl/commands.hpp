@@ -72,6 +72,9 @@ class Commands {
     kept_.clear();
   }
 
+  /// Lets the device begin at once, where a driver would collect commands until the host waits.
+  void start() { queue_now().flush(); }
+
   /// Waits for all commands, if some may still run, and releases the values kept for them.
   void wait();
 

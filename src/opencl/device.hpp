@@ -15,7 +15,7 @@ struct Device {
   bool is_pocl_cpu = false;    ///< what WorkShape says of PoCL, which other drivers of CPUs do not share: they compile vectors of 16 for
                                ///< minutes, and barriers at once
   int lanes = 1;               ///< points that one work item handles at once: 16 or 1
-  bool has_teams = false;      ///< has work items enough for WorkShape::view_team: no CPU
+  bool has_teams = false;      ///< work items share pixels and surfels (WorkShape::view_team): not on CPUs, but for tests
   bool shares_memory = false;  ///< the device works in the host's memory
   std::string description;     ///< platform, name and compute units
   std::string choice;          ///< why this device was taken, for display

@@ -13,13 +13,13 @@ namespace frontier_surfels {
 /// alone is a hundred times slower there than on a CPU, and each time the host waits the device runs dry. The results are the same, bit by
 /// bit.
 struct WorkShape {
-  bool is_near = true;            ///< asking costs little: the host waits for the length of each list, so that no work item is idle, and
-                                  ///< looks for what it wants in the device's memory, which is its own
-  bool many_items = false;        ///< as a graphics processor likes it; chosen where a work item has one lane
-  std::size_t heavy_group = 1;    ///< group size for kernels with much work per item
-  std::size_t tile_group = 1;     ///< and of settle_candidates, with its many barriers
-  std::size_t view_team = 1;      ///< at most so many work items have a pixel or a surfel together, where it mostly waits for the images of
-                                  ///< kept views
+  bool is_near = true;          ///< asking costs little: the host waits for the length of each list, so that no work item is idle, and
+                                ///< looks for what it wants in the device's memory, which is its own
+  bool many_items = false;      ///< as a graphics processor likes it; chosen where a work item has one lane
+  std::size_t heavy_group = 1;  ///< group size for kernels with much work per item
+  std::size_t tile_group = 1;   ///< and of settle_candidates, with its many barriers
+  std::size_t view_team = 1;  ///< at most so many work items have a pixel, a candidate or a surfel together, where it mostly waits for the
+                              ///< images of kept views
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
   std::size_t scan_by_group = 0;  ///< so many by one work-group
   std::size_t scan_group = 1;     ///< work items of this group

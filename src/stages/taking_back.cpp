@@ -100,10 +100,7 @@ std::size_t TakingBack::give_back(const Camera& camera, const MapWindow& window,
   if (!has_taken()) return pixels_;
   const std::vector<Brick> with_points = bricks_with_points(window);
   std::vector<Brick> bricks = bricks_to_change(*frame, window, image, {}, with_points);
-  if (!bricks.empty()) {
-    change_bricks(*frame, camera, views, window, false, std::move(bricks));
-    taken_.open_window(window);
-  }
+  if (!bricks.empty()) change_bricks(*frame, camera, views, window, false, std::move(bricks));  // all in blocks that had tables
   frame->has_taken = with_points.empty() ? 0 : 1;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
@@ -117,7 +114,7 @@ bool TakingBack::must_update() {
 
 /// The bricks of the window that have taken points.
 std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& window) const {
-  if (taken_.empty()) return {};  // then the window is not opened
+  if (taken_.empty()) return {};  // then no window was opened
   const int sides = 1 << taken_.shift();
   const Window& w = window.window();
   std::vector<Brick> bricks;
@@ -239,8 +236,8 @@ std::vector<TakingBack::Brick> TakingBack::bricks_to_change(const Frame& frame, 
   return bricks;
 }
 
-/// Sets and clears the points of bricks, which get words of their own for that. settle_bricks() must follow.
-/// @param has_chosen  if not, and pixels were chosen all the same, the device changes nothing
+/// Sets and clears the points of bricks, which get words of their own for that. settle_bricks() must follow, once the host has waited.
+/// @param has_chosen  if not, and pixels were chosen all the same, no point is changed
 void TakingBack::change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
                                std::vector<Brick> bricks) {
   std::vector<cl_int4> taken_by;

@@ -42,8 +42,8 @@ class TakingBack {
   /// @throws cl::Error  the device failed: what was taken back stays so, and counts for the next frame
   std::size_t update(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views, Frame* frame);
 
-  /// For frames that hardly take space back: the same as update(), unless must_update() says later that this frame does. Does not wait for
-  /// the device: frame->has_taken says whether any point of the window may be taken.
+  /// For frames that are not likely to take space back: the same as update(), unless must_update() says later that this frame does; then
+  /// nothing has changed. Does not wait for the device: frame->has_taken says whether any point of the window may be taken.
   std::size_t give_back(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views, Frame* frame);
 
   /// To be called after give_back(), once the host has waited for the device.
@@ -67,7 +67,7 @@ class TakingBack {
   const SeenPoints& taken() const { return taken_; }
   bool has_taken() const { return is_on_ && !taken_.empty(); }
 
-  /// @name Of the last look() that had views or seen points to ask, [height][width] of the working image
+  /// @name Of the last look() that had last frames, and views or seen points to ask, [height][width] of the working image
   /// @{
   /// NO_EVIDENCE, WEAK_EVIDENCE or STRONG_EVIDENCE
   const DeviceArray<cl_uchar>& evidence() const { return evidence_; }
@@ -110,7 +110,7 @@ class TakingBack {
   std::vector<BlockKey> changed_;
   std::deque<LastFrame> last_frames_;       ///< newest first, at most LAST_FRAMES
   std::size_t pixels_ = 0;                  ///< whose surface has taken space back since the last frame that did not fail
-  std::size_t frames_since_ = LAST_FRAMES;  ///< that took space back
+  std::size_t frames_since_ = LAST_FRAMES;  ///< frames since one took space back, at most LAST_FRAMES
   std::size_t room_size_ = 0;               ///< [pixel]
   DeviceArray<float> images_;               ///< [LAST_FRAMES][room_size_]: depths of the last frames
   SentArray<View> frame_views_, older_views_;

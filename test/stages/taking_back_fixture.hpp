@@ -99,12 +99,15 @@ class TakingBackFixture : public FrameFixture {
     taking.open_window(map().window(), seen());
   }
 
-  /// In every second call as in frames that are not likely to take space back.
-  std::size_t update() {
+  /// By turns as in frames that are likely to take space back, and as in others.
+  std::size_t update() { return update(!asked_first); }
+
+  /// @param ask_first  whether the host waits at once for the answer whether the frame takes space back
+  std::size_t update(bool ask_first) {
     told = make_frame(camera(), map().window(), views(), &seen(), limits());
     taking.look(camera(), views(), seen(), &told);
-    asked_first = !asked_first;
-    if (!asked_first) {
+    asked_first = ask_first;
+    if (!ask_first) {
       const std::size_t count = taking.give_back(camera(), map().window(), now.image, views(), &told);
       commands().wait();
       if (!taking.must_update()) return count;
@@ -136,7 +139,7 @@ class TakingBackFixture : public FrameFixture {
 
   TakingBack taking;
   Frame told = {};                       ///< of the last update()
-  bool asked_first = false;              ///< the last update() asked at once whether the frame takes space back
+  bool asked_first = false;              ///< of the last update()
   reference::SeenView now;               ///< this frame
   std::deque<reference::SeenView> last;  ///< the last frames, newest first
 
