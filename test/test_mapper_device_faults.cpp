@@ -151,16 +151,29 @@ TEST_F(MapperDeviceFaults, AFrameThatRemovesAndCreates) {
   fail_everywhere(undecimated(), orbit_frames(small_camera(), 4, 6), 2, wanted);
 }
 
-/// A box that is put down: the frame takes space back, and what floats there goes.
-TEST_F(MapperDeviceFaults, AFrameThatTakesSpaceBack) {
+/// A box that is put down before a wall, and taken away later.
+Frames box_that_goes() {
   Frames frames;
-  for (int n = 0; n < 20; ++n) {
+  for (int n = 0; n < 32; ++n) {
     frames.push_back(plane_frame(small_camera(), 2, Eigen::Isometry3d(Eigen::Translation3d(0.008 * n, 0, 0))));
-    if (n >= 12) frames.back().depth(cv::Rect(12, 8, 16, 14)) = 1.5;
+    if (n >= 12 && n < 30) frames.back().depth(cv::Rect(12, 8, 16, 14)) = 1.5;
   }
+  return frames;
+}
+
+/// What floats there goes.
+TEST_F(MapperDeviceFaults, AFrameThatTakesSpaceBack) {
   Report wanted;
   wanted.taken_back = 50;
-  fail_everywhere(undecimated(), frames, 17, wanted);
+  fail_everywhere(undecimated(), box_that_goes(), 17, wanted);
+}
+
+/// The host does not wait for the evidence then, and does wait in a frame just after one that took space back.
+TEST_F(MapperDeviceFaults, AFrameThatGivesSpaceBack) {
+  Report wanted;
+  wanted.removed = 50;
+  fail_everywhere(undecimated(), box_that_goes(), 30, wanted);
+  fail_everywhere(undecimated(), box_that_goes(), 20, Report());
 }
 
 /// As before, and with known space from the surfels, because views have been forgotten.
