@@ -46,6 +46,25 @@ TEST(BlockIndex, ReusesFreePages) {
   EXPECT_EQ(*index.find(b), (Pages{1, 3}));
 }
 
+TEST(BlockIndex, RemovesSeveralPagesAtOnce) {
+  BlockIndex index;
+  const BlockKey a = {0, 0, 0}, b = {0, 0, 1};
+  for (int n = 0; n < 6; ++n) index.add_page(n == 3 ? b : a);
+  index.remove_pages(a, {1, 5}, 0);
+  EXPECT_EQ(*index.find(a), (Pages{0, 2, 4}));
+  index.remove_pages(a, {3, 4}, 0);  // another block's page
+  EXPECT_EQ(*index.find(b), (Pages{3}));
+  EXPECT_EQ(index.add_page(b), 5u) << "the last one that became free";
+  EXPECT_EQ(index.add_page(b), 1u);
+  index.remove_pages(b, {3, 5, 1}, 7);
+  EXPECT_EQ(index.find(b), nullptr);
+  EXPECT_EQ(index.add_page(a), 6u) << "they wait";
+  index.release(7);
+  EXPECT_EQ(index.add_page(a), 1u);
+  index.remove_pages({7, 0, 0}, {0}, 0);
+  EXPECT_EQ(*index.find(a), (Pages{0, 2, 4, 6, 1}));
+}
+
 TEST(BlockIndex, ForgetsBlocksWithoutPages) {
   BlockIndex index;
   index.add_page({5, 5, 5});

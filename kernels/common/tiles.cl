@@ -31,6 +31,9 @@ typedef struct {
   uint view_count;
   uint likely_views;          // of the first group: those asked because of the probes, a bit each
   uint known_by[PROBES + 1];  // of the first group: those that know so many probes, a bit each
+#if LANES == 1
+  uint near[MOST_VIEWS / VIEW_GROUP];  // of each group: those that may know something near the candidates, a bit each
+#endif
 } Tile;
 
 INLINE ulong all_bits(ulong8 words) {

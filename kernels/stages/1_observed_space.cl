@@ -37,12 +37,22 @@ INLINE uintv pixel_bits(uintv range, int first) {
 
 // The cuboid's share of 32 layers of LANES x `row_count` columns: a voxel is observed iff there is a valid pixel in a fixed rectangle of
 // the image. Valid pixels of a rectangle's rows are joined, a bit for each column of pixels, for all voxels of a row of the grid at once.
+// At width 1 there is one column, and nobody looks on behind the first valid pixel: rectangles of near layers are as large as the image.
 //   i, j: the first of the columns;   i/o observed[row_count]: bits of the layers
 INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global const uint* pixels_i, __global const ushort2* pixels_j,
                            __global const ushort2* words_i, int i, int j, int row_count, int first_layer, uintv* observed) {
   const int chunks_i = (g->size_i + TABLE_CHUNK - 1) / TABLE_CHUNK, chunks_j = (g->size_j + TABLE_CHUNK - 1) / TABLE_CHUNK;
   for (int k = first_layer; k < first_layer + 32; ++k) {
     const ushort2 words = words_i[k * chunks_i + i / TABLE_CHUNK];
+#if LANES == 1
+    const ushort2 rows = pixels_j[k * chunks_j * TABLE_CHUNK + j];
+    bool found = false;
+    for (int word = words.x; word < words.y && !found; ++word) {
+      const uint columns = pixel_bits(pixels_i[k * chunks_i * TABLE_CHUNK + i], 32 * word);
+      for (int row = rows.x; columns != 0 && row < rows.y && !found; ++row) found = (columns & valid[row * image_words(g) + word]) != 0;
+    }
+    if (found) *observed |= 1u << (k % 32);
+#else
     for (int word = words.x; word < words.y; ++word) {
       const uintv columns = pixel_bits(vloadv(0, pixels_i + k * chunks_i * TABLE_CHUNK + i), 32 * word);
       if (!any_lane(MARK(columns != 0u))) continue;
@@ -53,6 +63,7 @@ INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global c
         observed[n] |= (columns & joined) != 0u ? (uintv)(1u << (k % 32)) : (uintv)(0);
       }
     }
+#endif
   }
 }
 

@@ -52,6 +52,27 @@ INLINE void list_likely_views(const Grid* g, int3 tile, __global const float* la
   own->view_count = count;
 }
 
+// Finds the views that may know something of a box. At width 1 the work items share the views, else the groups of views.
+//   out own_views[view_groups]: a bit for each of them
+INLINE void find_near_views(__global const View* views, __global const float* view_lanes, int view_groups, __global const ushort* depths,
+                            const Box* box, __local Tile* own, __global ushort* own_views) {
+  const int item = get_local_id(0), items = get_local_size(0);
+#if LANES == 1
+  for (int n = item; n < view_groups; n += items) own->near[n] = 0;
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+  for (int n = item; n < view_groups * VIEW_GROUP; n += items) {
+    __global const float* group = view_lanes + n / VIEW_GROUP * (VIEW_LANE_FIELDS * VIEW_GROUP);
+    if (part_of_box(group, n % VIEW_GROUP, views + n, depths, box) != 0) atomic_or(&own->near[n / VIEW_GROUP], 1u << n % VIEW_GROUP);
+  }
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+  for (int n = item; n < view_groups; n += items) own_views[n] = (ushort)own->near[n];
+#else
+  for (int n = item; n < view_groups; n += items)
+    own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, box);
+#endif
+  GROUP_BARRIER(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+}
+
 // Lists the others that may know something near a tile's candidates. Each work item has a share of their groups, and counts what those
 // before it have.
 INLINE void list_views(__local Tile* own, __global const ushort* tile_views, int view_groups) {
@@ -216,9 +237,7 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
       keep_entries(&own, tile);
       Box box;
       find_candidates_box(&f.grid, &own, tile, layer_depth, f.limits.min_gap, &box);
-      for (int n = item; n < view_groups; n += items)
-        own_views[n] = views_of_box(view_lanes + n * VIEW_LANE_FIELDS * VIEW_GROUP, views + n * VIEW_GROUP, depths, &box);
-      GROUP_BARRIER(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+      find_near_views(views, view_lanes, view_groups, depths, &box, &own, own_views);
       list_views(&own, own_views, view_groups);
       GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
       ask_views(&f.grid, tile, layer_depth, views, depths, &own);

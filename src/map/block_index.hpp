@@ -27,6 +27,9 @@ class BlockIndex {
   /// @param frame  the page becomes free by release(frame) or later; 0: it is free at once
   void remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame = 0);
 
+  /// The same for several pages of a block, in the order that they have there. Searched once, not once for each.
+  void remove_pages(const BlockKey& block, const Pages& removed, std::uint32_t frame);
+
   /// Makes the pages free that have been removed in frames up to `frame`.
   void release(std::uint64_t frame);
 
@@ -40,6 +43,8 @@ class BlockIndex {
   const std::unordered_map<BlockKey, Pages>& blocks() const { return blocks_; }
 
  private:
+  void drop(std::uint32_t page, std::uint32_t frame);
+
   std::unordered_map<BlockKey, Pages> blocks_;
   Pages free_;                                                    ///< add_page() takes the last one
   std::vector<std::pair<std::uint32_t, std::uint32_t>> removed_;  ///< frame and page of those that are not free yet

@@ -54,10 +54,12 @@ std::vector<BlockKey> SurfelMap::commit(std::uint32_t frame) {
   if (logs_changes_) log_.note(frame, window_pages_, frame_changes_);  // memory may run out: while the frame can still be undone
   undo_ = {};
   std::vector<BlockKey> shrunk;
-  for (const std::size_t n : empty_pages_) {
-    const BlockKey block = window_.block(static_cast<int>(page_cells_[n]));
-    index_.remove_page(block, window_pages_[n], removal(frame));
-    shrunk.push_back(block);
+  for (auto next = empty_pages_.begin(); next != empty_pages_.end();) {  // a block's pages lie together, but for new ones
+    const cl_uint cell = page_cells_[*next];
+    BlockIndex::Pages removed;
+    for (; next != empty_pages_.end() && page_cells_[*next] == cell; ++next) removed.push_back(window_pages_[*next]);
+    shrunk.push_back(window_.block(static_cast<int>(cell)));
+    index_.remove_pages(shrunk.back(), removed, removal(frame));
   }
   return shrunk;
 }
