@@ -251,6 +251,7 @@ class SentArray {
     FaultInjection::step(Call::kAllocation, "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE);
     const std::size_t bytes = values->size() * sizeof(T);
     buffer_ = buffer_over(values);
+    commands_->keep(values);  // rusticl destroys a buffer before the commands that use it have run
     commands_->release(shared_bytes_);
     shared_bytes_ = bytes;
     commands_->allocated(shared_bytes_);
