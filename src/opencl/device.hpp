@@ -10,8 +10,8 @@ struct Device {
   cl::Device device;
   cl::Context context;
   bool is_cpu = false;
-  bool is_pocl = false;        ///< of other drivers' devices we keep the built kernels as files; PoCL has a cache of its own, and what
-                               ///< ours would gain there was not measured
+  bool is_pocl = false;        ///< of other drivers' devices we keep the built kernels as files. PoCL has a cache of its own, which is as
+                               ///< fast when warm; to fill ours takes it 45 s, because it compiles all kernels then, not only those used
   bool is_pocl_cpu = false;    ///< what WorkShape says of PoCL, which other drivers of CPUs do not share: they compile vectors of 16 for
                                ///< minutes, and barriers at once
   int lanes = 1;               ///< points that one work item handles at once: 16 or 1
