@@ -18,7 +18,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 
-rm -rf "$prefix"
+rm -rf "$prefix" "$prefix.moved"  # an earlier run may have been stopped
 cmake --install "$build" >install.log
 if [ -e "$prefix/.catkin" ]; then
   programs=$prefix/lib/frontier_surfels

@@ -132,6 +132,11 @@ std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& w
 
 /// Chooses the pixels whose surface takes space back, and counts them.
 void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen) {
+  const auto across = [](int size) { return static_cast<std::size_t>((size + TAKE_SQUARE - 1) / TAKE_SQUARE); };
+  const std::size_t coarse = across(frame.grid.width) * across(frame.grid.height);
+  const std::size_t rows = frame.grid.height, pixels = frame.grid.width * rows;
+  coarse_.resize(coarse);  // in the first frame already, so that the memory in use does not grow later
+  for (DeviceArray<cl_uchar>* all : {&evidence_, &squares_, &chosen_}) all->resize(pixels);
   if (last_frames_.size() < static_cast<std::size_t>(limits_.weak_supports)) return;
   std::vector<View> last, older = views.views_before(last_frames_.back().number);
   if (older.empty() && frame.has_seen == 0) return;
@@ -143,11 +148,6 @@ void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
   older_count_ = static_cast<cl_int>(older.size());
   older_views_.send(std::move(older));
 
-  const auto across = [](int size) { return static_cast<std::size_t>((size + TAKE_SQUARE - 1) / TAKE_SQUARE); };
-  const std::size_t coarse = across(frame.grid.width) * across(frame.grid.height);
-  const std::size_t rows = frame.grid.height, pixels = frame.grid.width * rows;
-  coarse_.resize(coarse);
-  for (DeviceArray<cl_uchar>* all : {&evidence_, &squares_, &chosen_}) all->resize(pixels);
   weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_());
   weigh("weigh_evidence", commands_.chunks(frame.grid.width) * rows, frame, camera, views, seen, coarse_(), evidence_());
   commands_.run(kStage, "find_squares", pixels, kGroup, frame, evidence_(), squares_());
