@@ -33,17 +33,6 @@ void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_
     free_.push_back(page);
 }
 
-void BlockIndex::remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame) {
-  const auto found = blocks_.find(block);
-  if (found == blocks_.end()) return;
-  Pages& pages = found->second;
-  const auto at = std::find(pages.begin(), pages.end(), page);
-  if (at == pages.end()) return;
-  drop(page, frame);
-  pages.erase(at);
-  if (pages.empty()) blocks_.erase(found);
-}
-
 void BlockIndex::remove_pages(const BlockKey& block, const Pages& removed, std::uint32_t frame) {
   const auto found = blocks_.find(block);
   if (found == blocks_.end()) return;
@@ -51,22 +40,18 @@ void BlockIndex::remove_pages(const BlockKey& block, const Pages& removed, std::
   auto next = removed.begin();
   auto kept = pages.begin();
   for (const std::uint32_t page : pages) {
-    if (next != removed.end() && page == *next) {
-      drop(page, frame);
-      ++next;
-    } else {
+    if (next == removed.end() || page != *next) {
       *kept++ = page;
+      continue;
     }
+    ++next;
+    if (frame == 0)
+      free_.push_back(page);
+    else
+      removed_.emplace_back(frame, page);
   }
   pages.erase(kept, pages.end());
   if (pages.empty()) blocks_.erase(found);
-}
-
-void BlockIndex::drop(std::uint32_t page, std::uint32_t frame) {
-  if (frame == 0)
-    free_.push_back(page);
-  else
-    removed_.emplace_back(frame, page);
 }
 
 void BlockIndex::release(std::uint64_t frame) {

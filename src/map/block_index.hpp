@@ -23,12 +23,10 @@ class BlockIndex {
   /// Undoes the last add_page(), or after that the one before it. @param end  end() before the first one that will be undone
   void take_back(const BlockKey& block, std::uint32_t page, std::size_t end);
 
-  /// Removes a page from its block. Does nothing if the page is not the block's.
-  /// @param frame  the page becomes free by release(frame) or later; 0: it is free at once
-  void remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame = 0);
-
-  /// The same for several pages of a block, in the order that they have there. Searched once, not once for each.
-  void remove_pages(const BlockKey& block, const Pages& removed, std::uint32_t frame);
+  /// Removes pages from their block, in one pass through its pages. From one on that is not the block's, or not in its order, they stay.
+  /// @param frame  the pages become free by release(frame) or later; 0: they are free at once
+  void remove_pages(const BlockKey& block, const Pages& removed, std::uint32_t frame = 0);
+  void remove_page(const BlockKey& block, std::uint32_t page, std::uint32_t frame = 0) { remove_pages(block, {page}, frame); }
 
   /// Makes the pages free that have been removed in frames up to `frame`.
   void release(std::uint64_t frame);
@@ -43,8 +41,6 @@ class BlockIndex {
   const std::unordered_map<BlockKey, Pages>& blocks() const { return blocks_; }
 
  private:
-  void drop(std::uint32_t page, std::uint32_t frame);
-
   std::unordered_map<BlockKey, Pages> blocks_;
   Pages free_;                                                    ///< add_page() takes the last one
   std::vector<std::pair<std::uint32_t, std::uint32_t>> removed_;  ///< frame and page of those that are not free yet

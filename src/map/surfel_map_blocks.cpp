@@ -152,7 +152,7 @@ void SurfelMap::drop_block(const BlockKey& block, std::uint32_t frame) {
   }
   if (logs_changes_)
     for (const auto& [page, alive] : undo_.dropped) log_.note(frame, {page}, {alive});
-  for (const Page page : pages) index_.remove_page(block, page, removal(frame));
+  index_.remove_pages(block, pages, removal(frame));
   size_ -= dropped;
   undo_ = {};
 }
