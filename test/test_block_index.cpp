@@ -46,6 +46,19 @@ TEST(BlockIndex, ReusesFreePages) {
   EXPECT_EQ(*index.find(b), (Pages{1, 3}));
 }
 
+TEST(BlockIndex, TellsTheNextPages) {
+  BlockIndex index;
+  const BlockKey a = {0, 0, 0}, b = {0, 0, 1};
+  EXPECT_EQ(index.next_pages(2), (Pages{0, 1}));
+  for (int n = 0; n < 4; ++n) index.add_page(a);
+  index.remove_pages(a, {0, 2});
+  EXPECT_TRUE(index.next_pages(0).empty());
+  EXPECT_EQ(index.next_pages(1), Pages{2});
+  const Pages next = index.next_pages(4);
+  EXPECT_EQ(next, (Pages{2, 0, 4, 5}));
+  for (const std::uint32_t page : next) EXPECT_EQ(index.add_page(b), page);
+}
+
 TEST(BlockIndex, RemovesSeveralPagesAtOnce) {
   BlockIndex index;
   const BlockKey a = {0, 0, 0}, b = {0, 0, 1};

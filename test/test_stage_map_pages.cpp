@@ -9,6 +9,7 @@
 
 #include "stages/frame_fixture.hpp"
 #include "stages/reference_surfels.hpp"
+#include "stages/removal.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -31,6 +32,14 @@ struct Book {
       if (surfels.count(slot) == 0) free.push_back(slot);
     return free;
   }
+};
+
+/// What a frame has found that goes ahead.
+struct Finding {
+  cl_uint evidence = 0, large = 0, labelled = 0;  ///< pixels, surfels
+  cl_uint unlisted = 0, unchosen = 0;             ///< entries without room
+  bool asks = true;                               ///< whether pixels want to take space back
+  bool fails = false;                             ///< the frame is undone after that
 };
 
 /// A map with the window of a view, and the book of its expected content.
@@ -68,7 +77,8 @@ class Pages {
 
   /// Inserts random surfels into a few cells of the window.
   /// @param leave  share of the surfels that leave the map, unless it is negative: after the new ones have been sorted early
-  void insert(int count, int cells, double leave = -1) {
+  /// @param found  if not null, the frame goes ahead. @return whether the device has gone on
+  bool insert(int count, int cells, double leave = -1, const Finding* found = nullptr) {
     std::vector<cl_uint> some;
     for (int n = 0; n < cells; ++n) some.push_back(cells_[random_.whole(0, static_cast<int>(cells_.size()) - 1)]);
     std::vector<cl_uint4> surfels;
@@ -82,15 +92,19 @@ class Pages {
     DeviceArray<cl_uint> new_cells(commands);
     new_surfels.write(surfels);
     new_cells.write(where);
-    map().reserve(count);
-    if (leave < 0)
+    bool goes_on = false;
+    if (leave < 0) {
+      map().reserve(count);
       map().insert("test", new_surfels, new_cells, count);
-    else
-      insert_while_others_leave(new_surfels, new_cells, count, leave);
+    } else {
+      goes_on = insert_while_others_leave(new_surfels, new_cells, count, leave, found);
+    }
+    if (found != nullptr && found->fails) return goes_on;
     std::set<std::uint32_t> before;
     for (const auto& [slot, surfel] : book_.surfels) before.insert(slot);
     check_insertion(surfels, where, fixture_.access().find_slots(surfels, where, before));
     check_window();
+    return goes_on;
   }
 
   /// Expects that the window lists every page of each cell that may be in the grid, once, in any order.
@@ -121,6 +135,7 @@ class Pages {
 
   void finish() {
     map().finish_frame("test", frame_);
+    fixture_.commands().wait();
     map().commit(frame_);
     if (!book_.pages.empty()) last_page_ = std::max(last_page_, book_.pages.rbegin()->first);
     std::set<std::uint32_t> full;
@@ -157,8 +172,8 @@ class Pages {
  private:
   static constexpr double kBlock = 0.5;
 
-  void insert_while_others_leave(const DeviceArray<cl_uint4>& new_surfels, const DeviceArray<cl_uint>& new_cells, std::size_t count,
-                                 double share) {
+  bool insert_while_others_leave(const DeviceArray<cl_uint4>& new_surfels, const DeviceArray<cl_uint>& new_cells, std::size_t count,
+                                 double share, const Finding* found) {
     const std::vector<std::uint32_t> pages = fixture_.access().window_pages();
     std::vector<cl_ulong> words(pages.size() + 1, 0);
     std::vector<std::uint32_t> leaving;
@@ -172,11 +187,44 @@ class Pages {
     bits.write(words);
     DeviceArray<cl_uint> length(fixture_.commands());
     length.write({static_cast<cl_uint>(count)});
-    ASSERT_TRUE(map().sort_early("test", {new_cells, length(), count + 1, count}, bits));
-    fixture_.commands().wait();
-    fixture_.access().kill(leaving);
+    EXPECT_TRUE(map().sort_early("test", {new_cells, length(), count + 1, count}, bits));
+    const bool goes_on = found != nullptr && go_ahead(*found, new_surfels, count, bits, leaving.size());
+    if (found != nullptr && found->fails) {
+      map().roll_back();
+      return goes_on;
+    }
+    if (!goes_on) {
+      fixture_.commands().wait();
+      expect_as_in_book();
+      map().reserve(count);
+      remove_surfels(fixture_.commands(), bits, leaving.size(), map());
+      map().insert_sorted("test", new_surfels, count);
+    }
     for (const std::uint32_t slot : leaving) book_.surfels.erase(slot);
-    map().insert_sorted("test", new_surfels, count);
+    return goes_on;
+  }
+
+  bool go_ahead(const Finding& found, const DeviceArray<cl_uint4>& new_surfels, std::size_t count, const DeviceArray<cl_ulong>& leaving,
+                std::size_t leave) {
+    Commands& commands = fixture_.commands();
+    DeviceArray<cl_uint> evidence(commands), listed(commands), chosen(commands), counts(commands);
+    evidence.write({found.evidence});
+    listed.write({7, 7 + found.unlisted});
+    chosen.write({static_cast<cl_uint>(count), static_cast<cl_uint>(count) + found.unchosen});
+    counts.write({0, found.large, static_cast<cl_uint>(leave), found.labelled, 0});
+    const bool is_ahead = map().go_ahead("test", {found.asks ? &evidence() : nullptr, listed(), chosen(), counts()});
+    EXPECT_NE(is_ahead, commands.shape().is_near);
+    if (!is_ahead) return false;
+    remove_surfels(commands, leaving, std::nullopt, map());
+    map().insert_sorted("test", new_surfels, 0);
+    commands.wait();
+    const bool goes_on = counts.read_one(COUNT_GOES_ON) != 0;
+    if (found.fails) return goes_on;  // before the host has told the map
+    if (goes_on)
+      map().went_on(leave, count);
+    else
+      map().stayed();
+    return goes_on;
   }
 
   void note(std::uint32_t slot, const Packed& surfel) {
@@ -260,6 +308,47 @@ TEST(StageMapPages, NewSurfelsAreSortedBeforeOthersHaveLeft) {
         pages.insert(count / 3, 5);
         pages.expect_as_in_book();
       }
+}
+
+/// Where the host does not wait, the device gives the same slots, unless there is something that the host must look at first.
+TEST(StageMapPages, TheDeviceGoesOnByItself) {
+  const bool is_near = test_commands().shape().is_near;
+  const std::vector<Finding> obstacles = {{1, 0, 0, 0, 0}, {0, 1, 0, 0, 0}, {0, 0, 5000, 0, 0}, {0, 0, 0, 1, 0}, {0, 0, 0, 0, 1}};
+  for (const int there : {0, 1, 3000}) {
+    Pages pages(static_cast<unsigned>(there));
+    pages.fill(there);
+    std::uint32_t frame = 2;
+    const auto insert = [&](int count, int cells, double leave, const Finding& found) {
+      SCOPED_TRACE(std::to_string(there) + " surfels and " + std::to_string(count) + " more, frame " + std::to_string(frame));
+      pages.open_window(frame++);
+      const bool goes_on = pages.insert(count, cells, leave, &found);
+      pages.finish();
+      pages.expect_as_in_book();
+      return goes_on;
+    };
+    for (const double leave : {0.0, 0.3, 1.0})
+      for (const int count : {0, 1, 700}) EXPECT_NE(insert(count, 20, leave, {}), is_near);
+    for (const Finding& found : obstacles) EXPECT_FALSE(insert(100, 5, 0.3, found));
+    EXPECT_NE(insert(100, 5, 0.3, {1, 0, 0, 0, 0, false}), is_near) << "evidence counts that nobody asked for";
+    EXPECT_FALSE(insert(20000, 40, 0.1, {})) << "more pages than the device has";
+    EXPECT_NE(insert(20000, 40, 0.1, {}), is_near) << "not twice as many as in the frame before";
+  }
+}
+
+/// A frame that fails after the device has gone on, or has not.
+TEST(StageMapPages, AFrameThatWentAheadIsUndone) {
+  for (const cl_uint large : {0, 1}) {
+    Pages pages(6);
+    pages.fill(3000);
+    pages.open_window(2);
+    const Finding found = {0, large, 0, 0, 0, true, true};
+    EXPECT_EQ(pages.insert(700, 20, 0.3, &found), large == 0 && !test_commands().shape().is_near);
+    pages.expect_as_in_book();
+    pages.open_window(2);
+    pages.insert(700, 20, 0.3);
+    pages.finish();
+    pages.expect_as_in_book();
+  }
 }
 
 TEST(StageMapPages, ThousandsIntoOneBlock) {

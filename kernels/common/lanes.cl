@@ -22,7 +22,11 @@
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif
 
+#ifdef NOT_INLINED  // oclgrind does not know what its compiler makes of inlined functions
+#define INLINE static __attribute__((noinline))
+#else
 #define INLINE static inline __attribute__((always_inline))
+#endif
 #define OVERLOADED __attribute__((overloadable))
 
 // Asks for the 64 bytes at an address ahead of their use. OpenCL's own prefetch() does nothing in PoCL.

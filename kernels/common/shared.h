@@ -197,7 +197,8 @@ namespace frontier_surfels {
 #define COUNT_LARGE 1
 #define COUNT_REMOVED 2
 #define COUNT_LABELLED 3
-#define COUNTS 4
+#define COUNT_GOES_ON 4  // not a number: 1 if the frame goes on before the host knows them
+#define COUNTS 5
 
 // Bit fields of the sign field's events: EVENT_PLANES for each family of paths (i, j, k), in this order.
 #define EVENT_ENTER_FORWARD 0

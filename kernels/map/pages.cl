@@ -56,7 +56,8 @@ INLINE uint missing_pages(uint wanted, uint there) { return wanted > there ? (wa
 // One work item handles a cell, and one more the end.
 //   in  histogram: its prefix sum, with the total behind it;  cell_pages[cells + 1]: where each cell's pages begin in their list
 //       free_before: prefix sum of count_free's, with the total behind it
-//   out cell_begin[cells + 1]: where each cell's new surfels begin when sorted;  missing[cells]: pages that its block needs in addition
+//   out cell_begin[cells + 1]: where each cell's new surfels begin when sorted;  missing[cells + 1]: pages that its block needs in
+//       addition; their prefix sum is next
 __kernel void begin_cells(__global const uint* histogram, __global const uint* cell_pages, __global const uint* free_before,
                           const uint cells, const uint chunks, __global uint* cell_begin, __global uint* missing) {
   const uint cell = get_global_id(0);
@@ -69,15 +70,16 @@ __kernel void begin_cells(__global const uint* histogram, __global const uint* c
 }
 
 // One work item does all of the above for few new surfels, where launches take longer than that.
+//   out missing_before[cells + 1]: prefix sum of begin_cells' `missing`, with the total behind it
 __kernel void sort_few(__global const uint* new_cells, __global const uint* length, __global const uint* pages, const uint page_count,
                        __global const ulong* leaving, __global const ulong* alive, const int has_reserved, __global const ulong* reserved,
                        __global const uint* cell_pages, const uint cells, __global uint* free_before, __global uint* cell_begin,
-                       __global uint* missing, __global uint* order) {
+                       __global uint* missing_before, __global uint* order) {
   if (get_global_id(0) > 0) return;
   const uint count = length[0];
   for (uint cell = 0; cell <= cells; ++cell) cell_begin[cell] = 0;
   for (uint n = 0; n < count; ++n) ++cell_begin[new_cells[n] + 1];
-  __global uint* next = missing;  // in each cell
+  __global uint* next = missing_before;  // in each cell
   for (uint cell = 0; cell < cells; ++cell) {
     next[cell] = cell_begin[cell];
     cell_begin[cell + 1] += cell_begin[cell];
@@ -89,16 +91,39 @@ __kernel void sort_few(__global const uint* new_cells, __global const uint* leng
     free_slots += free_slots_of(pages[n], leaving[n], alive, has_reserved, reserved);
   }
   free_before[page_count] = free_slots;
-  for (uint cell = 0; cell < cells; ++cell)
-    missing[cell] =
-        missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
+  uint missing = 0;
+  for (uint cell = 0; cell < cells; ++cell) {
+    missing_before[cell] = missing;
+    missing += missing_pages(cell_begin[cell + 1] - cell_begin[cell], free_before[cell_pages[cell + 1]] - free_before[cell_pages[cell]]);
+  }
+  missing_before[cells] = missing;
 }
 
-// The first of a cell's new surfels, in their order by cell, that page n of the window's list may take.
-INLINE uint first_of_page(uint n, uint cell, uint known, __global const uint* new_ranks, __global const uint* cell_begin,
-                          __global const uint* cell_pages, __global const uint* free_before) {
-  const uint before = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * new_ranks[n - known];
-  return cell_begin[cell] + before - free_before[cell_pages[cell]];
+// May the frame's changes be carried out before the host knows them? Not if the frame has to look for them again, because it takes space
+// back, splits surfels or has had no room for all entries of a list; nor if it needs more pages, or room to keep what it overwrites, than
+// there are. One work item decides. The kernels that change the map ask counts[COUNT_GOES_ON], which is always 1 where the host has waited.
+//   in  evidence[1]: number of pixels that want to take space back, where `asks`;  listed[2], chosen[2]: lengths of lists
+//       missing_before[cells + 1];  spare: pages that the map can get;  room: surfels that can be kept
+//   i/o counts[COUNTS]
+__kernel void decide_to_go_on(__global const uint* evidence, const int asks, __global const uint* listed, __global const uint* chosen,
+                              __global const uint* missing_before, const uint cells, const uint spare, const uint room,
+                              __global uint* counts) {
+  if (get_global_id(0) > 0) return;
+  const bool is_found = (!asks || evidence[0] == 0) && counts[COUNT_LARGE] == 0 && listed[0] == listed[1] && chosen[0] == chosen[1];
+  counts[COUNT_GOES_ON] = is_found && missing_before[cells] <= spare && counts[COUNT_REMOVED] + counts[COUNT_LABELLED] <= room ? 1 : 0;
+}
+
+// The cell whose block gets an added page: the last one with missing_before[cell] <= n.
+INLINE uint cell_of_added(uint n, uint cells, __global const uint* missing_before) {
+  uint first = 0, end = cells;
+  while (end - first > 1) {
+    const uint middle = (first + end) / 2;
+    if (missing_before[middle] <= n)
+      first = middle;
+    else
+      end = middle;
+  }
+  return first;
 }
 
 // Notes which slots of a page have been filled.
@@ -113,19 +138,22 @@ INLINE void note_filled(const Window* window, uint page, uint cell, ulong filled
 
 // The free slots of the window's pages take their share of the cell's new surfels. One work item handles a page; at width 1 a work-group
 // has a page, and a work item a slot.
-//   in  pages[count], page_cells[count]: first the pages that begin_cells knows, by cell, then new_count pages that have been added for the
-//       surfels that those do not take;  new_ranks[new_count]: rank of each added page within its cell
+//   in  counts: of decide_to_go_on
+//       pages[count]: first the `known` pages that begin_cells knows, by cell, then pages for the surfels that those do not take, as many
+//       or more than are missing;  page_cells[known];  missing_before: prefix sum of begin_cells' `missing`
 //       reserved: may be the same buffer as `alive`
 //   i/o page_block, alive, changed, surfels: the map
-__kernel void fill_pages(const Window window, __global const uint* pages, __global const uint* page_cells, const uint count,
-                         __global const uint* new_ranks, const uint new_count, __global const uint* cell_begin,
+__kernel void fill_pages(__global const uint* counts, const Window window, __global const uint* pages, __global const uint* page_cells,
+                         const uint count, const uint known, __global const uint* missing_before, __global const uint* cell_begin,
                          __global const uint* cell_pages, __global const uint* free_before, __global const uint* order,
                          __global const uint4* new_surfels, __global int4* page_block, __global ulong* alive, __global ulong* changed,
                          __global const ulong* reserved, __global uint4* surfels) {
-  const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0), known = count - new_count;
-  if (n >= count) return;
-  const uint page = pages[n], cell = page_cells[n], end = cell_begin[cell + 1];
-  const uint first = first_of_page(n, cell, known, new_ranks, cell_begin, cell_pages, free_before);
+  const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0), cells = (uint)(window.size_x * window.size_y * window.size_z);
+  if (counts[COUNT_GOES_ON] == 0 || n >= count || (n >= known && n - known >= missing_before[cells])) return;
+  const uint page = pages[n], cell = n < known ? page_cells[n] : cell_of_added(n - known, cells, missing_before);
+  // Free slots of the cell in the pages before this one, counted from the first page of all
+  const uint free_so_far = n < known ? free_before[n] : free_before[cell_pages[cell + 1]] + PAGE_SLOTS * (n - known - missing_before[cell]);
+  const uint first = cell_begin[cell] + free_so_far - free_before[cell_pages[cell]], end = cell_begin[cell + 1];
   const ulong before = n < known ? alive[page] | reserved[page] : 0;  // added pages are free, whatever they have been before
 #if LANES == 1
   __local SharedWord filled;
@@ -149,19 +177,20 @@ __kernel void fill_pages(const Window window, __global const uint* pages, __glob
 
 // What the frame may overwrite next is kept. Called again before more is overwritten. One work item handles a page of the window; at width
 // 1 a work-group has a page, and a work item a slot.
-//   in  pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
+//   in  counts: of decide_to_go_on
+//       pages[count];  first: nothing is kept yet;  freed[count]: a bit for each surfel that is going to be removed
 //       page_block, alive, changed, surfels: the map; surfels marked as changed may be overwritten, too
 //       room: number of surfels that can be kept
 //   out kept_pages[count], kept_frames[count], kept_alive[count]: as at the first call
 //   i/o kept_slots[count]: a bit for each surfel that is kept;  kept_count: number of these
 //       kept_surfel_slots[kept_count], kept_surfels[kept_count]: where each of them was, in any order
-__kernel void back_up_pages(__global const uint* pages, const uint count, const int first, __global const ulong* freed,
-                            __global const int4* page_block, __global const ulong* alive, __global const ulong* changed,
-                            __global const uint4* surfels, const uint room, __global uint* kept_pages, __global int* kept_frames,
-                            __global ulong* kept_alive, __global ulong* kept_slots, __global uint* kept_count,
+__kernel void back_up_pages(__global const uint* counts, __global const uint* pages, const uint count, const int first,
+                            __global const ulong* freed, __global const int4* page_block, __global const ulong* alive,
+                            __global const ulong* changed, __global const uint4* surfels, const uint room, __global uint* kept_pages,
+                            __global int* kept_frames, __global ulong* kept_alive, __global ulong* kept_slots, __global uint* kept_count,
                             __global uint* kept_surfel_slots, __global uint4* kept_surfels) {
   const uint n = LANES == 1 ? get_group_id(0) : get_global_id(0);
-  if (n >= count) return;
+  if (counts[COUNT_GOES_ON] == 0 || n >= count) return;
   const uint page = pages[n];
   const ulong at_first = first ? alive[page] : kept_alive[n], before = first ? 0 : kept_slots[n];
   const ulong slots = at_first & ~before & (freed[n] | changed[page]);
@@ -196,11 +225,11 @@ __kernel void back_up_pages(__global const uint* pages, const uint count, const 
 }
 
 // One work item handles a page that back_up_pages has kept, after the frame has failed.
-//   in  kept_pages[count], kept_frames[count], kept_alive[count];   out page_block, alive: the map as it was
-__kernel void restore_pages(__global const uint* kept_pages, const uint count, __global const int* kept_frames,
+//   in  counts: of decide_to_go_on;  kept_pages[count], kept_frames[count], kept_alive[count];   out page_block, alive: the map as it was
+__kernel void restore_pages(__global const uint* counts, __global const uint* kept_pages, const uint count, __global const int* kept_frames,
                             __global const ulong* kept_alive, __global int4* page_block, __global ulong* alive) {
   const uint n = get_global_id(0);
-  if (n >= count) return;
+  if (counts[COUNT_GOES_ON] == 0 || n >= count) return;
   const uint page = kept_pages[n];
   page_block[page].w = kept_frames[n];
   alive[page] = kept_alive[n];
@@ -215,12 +244,14 @@ __kernel void restore_surfels(const uint count, __global const uint* kept_surfel
 }
 
 // One work item handles a page of the window at the end of a frame.
-//   in  pages[count], alive;   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
+//   in  counts: of decide_to_go_on;  pages[count], alive
+//   i/o changed: cleared for the next frame;  page_block: gets `frame` if the page has changed
 //   out changes[count]: what this frame has changed in them;  empty[count]: 1 if nothing is left
-__kernel void finish_pages(__global const uint* pages, const uint count, __global const ulong* alive, __global ulong* changed,
-                           const uint frame, __global int4* page_block, __global ulong* changes, __global uchar* empty) {
+__kernel void finish_pages(__global const uint* counts, __global const uint* pages, const uint count, __global const ulong* alive,
+                           __global ulong* changed, const uint frame, __global int4* page_block, __global ulong* changes,
+                           __global uchar* empty) {
   const uint n = get_global_id(0);
-  if (n >= count) return;
+  if (counts[COUNT_GOES_ON] == 0 || n >= count) return;
   const uint page = pages[n];
   changes[n] = changed[page];
   empty[n] = alive[page] == 0 ? 1 : 0;

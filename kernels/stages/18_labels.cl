@@ -2,14 +2,14 @@
 
 // One work item handles LANES surfels of a page of the window, those of them that are new and those that 5_visit has found at a surface;
 // work item PAGE_ITEMS n + m has the surfels from LANES m of pages[n].
-//   in  changed: which surfels they are;  depth, column_end: of 1_observed_space
+//   in  counts: of decide_to_go_on;  changed: which surfels they are;  depth, column_end: of 1_observed_space
 //       color[height][width]: red | green << 8 | blue << 16, if has_color
 //   i/o surfels: their attributes
-__kernel void label_surfels(const Frame f, __global const float* depth, __global const int* column_end, __global const uint* color,
-                            __global const uint* pages, const uint count, __global const ulong* alive, __global const ulong* changed,
-                            __global const int4* page_block, __global uint4* surfels) {
+__kernel void label_surfels(__global const uint* counts, const Frame f, __global const float* depth, __global const int* column_end,
+                            __global const uint* color, __global const uint* pages, const uint count, __global const ulong* alive,
+                            __global const ulong* changed, __global const int4* page_block, __global uint4* surfels) {
   const uint n = get_global_id(0) / PAGE_ITEMS;
-  if (n >= count) return;
+  if (counts[COUNT_GOES_ON] == 0 || n >= count) return;
   const uint page = pages[n], first = PAGE_SLOTS * page + LANES * (get_global_id(0) % PAGE_ITEMS);
   const uint lanes = lanes_of_page(alive[page] & changed[page], first);
   if (lanes == 0) return;

@@ -23,6 +23,12 @@ std::uint32_t BlockIndex::add_page(const BlockKey& block) {
   return page;
 }
 
+BlockIndex::Pages BlockIndex::next_pages(std::size_t count) const {
+  Pages next(free_.rbegin(), free_.rbegin() + static_cast<std::ptrdiff_t>(std::min(count, free_.size())));
+  for (std::uint32_t page = end_; next.size() < count; ++page) next.push_back(page);
+  return next;
+}
+
 void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_t end) {
   const auto found = blocks_.find(block);
   found->second.pop_back();

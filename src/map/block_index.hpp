@@ -20,6 +20,9 @@ class BlockIndex {
   /// Adds one page to a block: a free page if there is one, else the page at end(). @return number of the page
   std::uint32_t add_page(const BlockKey& block);
 
+  /// The pages that the next calls of add_page() will return, if no pages are removed or released before.
+  Pages next_pages(std::size_t count) const;
+
   /// Undoes the last add_page(), or after that the one before it. @param end  end() before the first one that will be undone
   void take_back(const BlockKey& block, std::uint32_t page, std::size_t end);
 

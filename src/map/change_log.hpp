@@ -18,7 +18,7 @@ class ChangeLog {
   using Words = std::vector<Word>;
 
   /// Frame `frame` has changed these slots. Frames come in order, also those that have changed nothing; one may come several times.
-  /// @param words  one for each page
+  /// @param words  one for each page; there may be more behind them
   void note(std::uint32_t frame, const std::vector<std::uint32_t>& pages, const Words& words);
 
   /// Frame `frame` has changed all slots of the pages 0, 1, ... `pages` - 1.

@@ -12,6 +12,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
+constexpr std::size_t kLeastSpares = 1024;    // pages that a frame which goes ahead may add
 constexpr std::size_t kGathered = 1 << 14;  // pages that are copied to the host at a time
 constexpr std::size_t kSpare = 16;          // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
                                             // costs nothing there until it is touched
@@ -40,14 +41,14 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       pages_list_(commands),
       page_cells_list_(commands),
       cell_pages_list_(commands),
-      new_ranks_list_(commands),
       histogram_(commands),
       cell_begin_(commands),
       free_before_(commands),
-      missing_(commands),
+      missing_before_(commands),
       order_(commands),
       new_count_(commands),
       nothing_(commands),
+      always_(commands),
       kept_pages_(commands),
       kept_count_(commands),
       kept_surfel_slots_(commands),
@@ -58,6 +59,9 @@ SurfelMap::SurfelMap(Commands& commands, Lists& lists, const Config& config)
       changed_words_(commands),
       empty_(commands) {
   grow(1024);
+  std::vector<cl_uint> counts(COUNTS, 0);
+  counts[COUNT_GOES_ON] = 1;
+  always_.write(counts);
 }
 
 /// Makes room for pages. New ones have no bits in `alive` and `changed`, like all pages without surfels.
@@ -91,6 +95,9 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   const double largest = std::max(largest_radius_, largest_created(grid));
   window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid), {largest, thickness_});
   begin_undo();
+  is_ahead_ = false;
+  spare_pages_ = index_.next_pages(commands_.shape().is_near ? 0 : std::max(next_spares_, kLeastSpares));
+  grow(index_.end() + spare_pages_.size());
   largest_radius_ = largest;
   listed_cells_.clear();
   for (int cell = 0; cell < window_.cells(); ++cell) {
@@ -102,35 +109,33 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
 
 /// Lists the window's pages, sorted by cell.
 void SurfelMap::list_window() {
-  std::vector<Page> pages;
-  std::vector<cl_uint> page_cells, cell_pages = {0};
+  close_window();
+  std::vector<cl_uint> cell_pages = {0};
   for (int cell = 0; cell < window_.cells(); ++cell) {
     if (listed_cells_[cell]) {
       const BlockIndex::Pages& own = *index_.find(window_.block(cell));
-      pages.insert(pages.end(), own.begin(), own.end());
-      page_cells.resize(pages.size(), static_cast<cl_uint>(cell));
+      window_pages_.insert(window_pages_.end(), own.begin(), own.end());
+      page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
     }
-    cell_pages.push_back(static_cast<cl_uint>(pages.size()));
+    cell_pages.push_back(static_cast<cl_uint>(window_pages_.size()));
   }
-  set_window(std::move(pages), std::move(page_cells), {});
+  sorted_pages_ = window_pages_.size();
+  page_cells_list_.send(page_cells_);
   cell_pages_list_.send(std::move(cell_pages));
+  send_pages();
 }
 
-void SurfelMap::set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks) {
-  close_window();  // stays closed if the lists cannot be sent
-  pages_list_.send(pages);
-  page_cells_list_.send(page_cells);
-  new_ranks_list_.send(new_ranks);
-  window_pages_ = std::move(pages);
-  page_cells_ = std::move(page_cells);
-  new_ranks_ = std::move(new_ranks);
+void SurfelMap::send_pages() {
+  std::vector<Page> pages = window_pages_;
+  pages.insert(pages.end(), spare_pages_.begin(), spare_pages_.end());
+  pages_list_.send(std::move(pages));
 }
 
 /// Forgets the window's pages: they may change their blocks.
 void SurfelMap::close_window() {
   window_pages_.clear();
   page_cells_.clear();
-  new_ranks_.clear();
+  sorted_pages_ = 0;
 }
 
 std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& list) const {
@@ -145,102 +150,6 @@ std::size_t SurfelMap::list_pages_near(double distance, DeviceArray<cl_uint>& li
   }
   list.write(near);
   return near.size();
-}
-
-void SurfelMap::reserve(std::size_t additional) {
-  const std::size_t blocks = std::min<std::size_t>(additional, window_.cells());
-  grow(index_.end() + additional / PAGE_SLOTS + blocks);
-}
-
-void SurfelMap::insert(const char* stage, const DeviceArray<cl_uint4>& surfels, const DeviceArray<cl_uint>& cells, std::size_t count) {
-  if (count == 0) return;
-  if (!new_ranks_.empty()) list_window();  // an earlier insertion has added pages, which are not sorted by cell yet
-  new_count_.resize(1);
-  new_count_.fill(stage, static_cast<cl_uint>(count), 1);
-  nothing_.resize(window_pages() + 1);
-  nothing_.fill(stage, 0, window_pages() + 1);
-  missing_told_ = nullptr;
-  sort(stage, {cells, new_count_(), count, count}, nothing_);
-  insert_sorted(stage, surfels, count);
-}
-
-bool SurfelMap::sort_early(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
-  missing_told_ = nullptr;
-  if (!new_ranks_.empty()) return false;
-  sort(stage, cells, leaving);
-  missing_told_ = missing_.read_later(window_.cells());
-  return true;
-}
-
-void SurfelMap::insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count) {
-  if (count == 0) return;
-  add_pages(missing_told_ != nullptr ? *missing_told_ : missing_.read(window_.cells()));
-  missing_told_ = nullptr;
-  const std::size_t items = window_pages() * (commands_.shape().many_items ? PAGE_SLOTS : 1);
-  commands_.run(stage, "fill_pages", items, PAGE_GROUP, window_.window(), pages_list_(), page_cells_list_(),
-                static_cast<cl_uint>(window_pages()), new_ranks_list_(), static_cast<cl_uint>(new_ranks_.size()), cell_begin_(),
-                cell_pages_list_(), free_before_(), order_(), surfels(), page_block_(), alive_(), changed_(), reserved(), surfels_());
-  size_ += count;
-}
-
-void SurfelMap::sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
-  const auto cell_count = static_cast<cl_uint>(window_.cells()), pages = static_cast<cl_uint>(window_pages());
-  free_before_.resize(pages + 1);
-  cell_begin_.resize(cell_count + 1);
-  missing_.resize(cell_count);
-  order_.resize(cells.room);
-  const std::size_t alone = commands_.shape().sort_alone;
-  if (alone == 0 || cells.expected > alone) return sort_by_cell(stage, cells, leaving);
-  commands_.run(stage, "sort_few", 1, 1, cells.cells(), cells.length, pages_list_(), pages, leaving(), alive_(),
-                static_cast<cl_int>(reserves_ids_), reserved(), cell_pages_list_(), cell_count, free_before_(), cell_begin_(), missing_(),
-                order_());
-}
-
-void SurfelMap::sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
-  const auto cell_count = static_cast<cl_uint>(window_.cells()), pages = static_cast<cl_uint>(window_pages());
-  const std::size_t bins = commands_.shape().sort_chunks * cell_count, group = commands_.shape().sort_group;
-  const auto chunks = static_cast<cl_uint>(commands_.shape().sort_chunks);
-  histogram_.resize(bins + 1);
-  histogram_.fill(stage, 0, bins);
-  commands_.run(stage, "count_cells", chunks, group, cells.cells(), cells.length, chunks, histogram_());
-  lists_.prefix_sums(stage, histogram_, bins);
-  if (pages == 0) free_before_.fill(stage, 0, 1);
-  commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, leaving(), alive_(), static_cast<cl_int>(reserves_ids_),
-                reserved(), free_before_());
-  lists_.prefix_sums(stage, free_before_, pages);
-  commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, chunks,
-                cell_begin_(), missing_());
-  commands_.run(stage, "sort_by_cell", chunks, group, cells.cells(), cells.length, chunks, histogram_(), order_());
-}
-
-/// Appends new pages to the window. @param missing  number of new pages for each cell
-void SurfelMap::add_pages(const std::vector<cl_uint>& missing) {
-  grow(index_.end() + std::accumulate(missing.begin(), missing.end(), std::size_t{0}));
-  std::vector<Page> pages = window_pages_;
-  std::vector<cl_uint> page_cells = page_cells_, ranks;
-  for (std::size_t cell = 0; cell < missing.size(); ++cell) {
-    if (missing[cell] > 0) listed_cells_[cell] = true;
-    for (cl_uint rank = 0; rank < missing[cell]; ++rank) {
-      pages.push_back(add_page(window_.block(static_cast<int>(cell))));
-      page_cells.push_back(static_cast<cl_uint>(cell));
-      ranks.push_back(rank);
-    }
-  }
-  if (!ranks.empty()) set_window(std::move(pages), std::move(page_cells), std::move(ranks));
-}
-
-void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {
-  const auto count = static_cast<cl_uint>(window_pages());
-  changed_words_.resize(count + 1);
-  empty_.resize(count + 1);
-  commands_.run(stage, "finish_pages", count, kGroup, pages_list_(), count, alive_(), changed_(), frame, page_block_(), changed_words_(),
-                empty_());
-  const auto changes = changed_words_.read_later(logs_changes_ ? count : 0);
-  const std::vector<cl_uchar> empty = empty_.read(count);  // waits for both, and for the whole frame
-  frame_changes_ = *changes;
-  empty_pages_.clear();
-  for (cl_uint n = 0; n < count; ++n)
-    if (empty[n]) empty_pages_.push_back(n);
 }
 
 Surfel SurfelMap::to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const {

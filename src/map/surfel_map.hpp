@@ -42,12 +42,18 @@ class SurfelMap {
   std::size_t window_pages() const { return window_pages_.size(); }
   const cl::Buffer& pages() const { return pages_list_(); }
 
+  /// Pages in pages() that a frame's changes may touch: the window's, and after go_ahead() those behind them that the frame may add.
+  std::size_t pages_to_change() const { return window_pages() + (is_ahead_ ? spare_pages_.size() : 0); }
+
+  /// What the kernels ask that change the map: kernels/map/pages.cl, decide_to_go_on.
+  const cl::Buffer& goes_on() const { return is_ahead_ ? ahead_counts_ : always_(); }
+
   /// Lists the pages of all blocks within a distance [m] of the window. @return number of pages
   std::size_t list_pages_near(double distance, DeviceArray<cl_uint>& list) const;
 
   /// Keeps what the frame may overwrite, so that roll_back() can undo the frame: surfels that are marked as changed, and those in `freed`.
   /// @param freed  surfels that are going to leave the map, a word for each page that the window had when it was opened
-  /// @param count  number of surfels in `freed`
+  /// @param count  number of surfels in `freed`; after go_ahead() it does not matter
   void back_up(const char* stage, const DeviceArray<cl_ulong>& freed, std::size_t count);
 
   /// Makes room for `additional` more surfels in this window.
@@ -68,8 +74,27 @@ class SurfelMap {
   /// @return false if insert() must be called, because the window has got pages in this frame; nothing was done
   bool sort_early(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
 
-  /// The other half, after that wait. @param count  the number of the surfels that were sorted
+  /// The other half, after that wait or after go_ahead(). @param count  the number of the surfels that were sorted; after go_ahead() it
+  ///                                                                    does not matter
   void insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count);
+
+  /// What only the device knows, and what keeps a frame from going on before the host knows it, too.
+  struct Doubts {
+    const cl::Buffer* evidence;         ///< [1]: pixels that want to take space back; null: none does
+    const cl::Buffer &listed, &chosen;  ///< [2]: lengths of the lists of candidates
+    const cl::Buffer& counts;           ///< [COUNTS] of SurfelVisit; gets COUNT_GOES_ON
+  };
+
+  /// After sort_early(): back_up(), insert_sorted(), finish_frame() and the stages between them may be called before the host has waited.
+  /// The device decides whether they change anything, and went_on() or stayed() must be called after the wait.
+  /// @return false if the host must wait first, because of the device, or as the frame has changed the map already; nothing was done
+  bool go_ahead(const char* stage, const Doubts& doubts);
+
+  /// The device has carried out what was called after go_ahead(). @param removed, added  numbers of surfels
+  void went_on(std::size_t removed, std::size_t added);
+
+  /// It has not: the map is as it was before go_ahead().
+  void stayed();
 
   /// Counts surfels that a kernel has marked as changed; back_up() makes room for them.
   void marked(std::size_t count) { undo_.most_kept += count; }
@@ -77,10 +102,11 @@ class SurfelMap {
   /// Subtracts surfels that a kernel has removed from size().
   void removed(std::size_t count) { size_ -= count; }
 
-  /// Marks the pages that changed as changed in this frame, and finds those that it has left empty. The frame can still fail.
+  /// Marks the pages that changed as changed in this frame, and finds those that it has left empty. The frame can still fail. Does not wait
+  /// for the device.
   void finish_frame(const char* stage, std::uint32_t frame);
 
-  /// Ends the frame for good, after finish_frame(): frees the empty pages. @return block of each freed page
+  /// Ends the frame for good, once the host has waited after finish_frame(): frees the empty pages. @return block of each freed page
   std::vector<BlockKey> commit(std::uint32_t frame);
 
   /// Undoes what a failed frame, or a failed add_block() or drop_block(), has done since the last commit(). Nothing else can be done with
@@ -146,6 +172,7 @@ class SurfelMap {
   struct Undo {
     bool open = false;                                 ///< something may have to be undone
     bool lost = false;                                 ///< replace() has begun
+    bool ahead = false;                                ///< only the device knows whether there is something to undo
     double largest_radius = 0;                         ///< [m]
     std::size_t size = 0, end = 0;                     ///< of the map, of the index
     std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them
@@ -163,12 +190,13 @@ class SurfelMap {
   void grow(std::size_t pages);
   double window_margin(const Grid& grid) const;
   void list_window();
-  void set_window(std::vector<Page> pages, std::vector<cl_uint> page_cells, std::vector<cl_uint> new_ranks);
+  void send_pages();
   void close_window();
-  void add_pages(const std::vector<cl_uint>& missing);
+  void add_missing_pages();
   std::size_t allocated_bytes() const;
   const cl::Buffer& reserved() const { return reserves_ids_ ? reserved_() : alive_(); }   ///< no new surfel may take these slots
   std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
+  void make_room_to_keep(std::size_t surfels);
   void sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   void sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
@@ -188,19 +216,28 @@ class SurfelMap {
   DeviceArray<cl_ulong> reserved_;  ///< those whose surfels a reader knows, alive or not. Only with reserves_ids_
   DeviceArray<cl_int4> page_block_;
 
-  // This frame's window: its pages, sorted by cell
+  // This frame's window: its pages, sorted by cell, and then those that the frame has added
   MapWindow window_;
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_;  ///< cell of each page
   std::vector<bool> listed_cells_;   ///< cells with listed pages: their block meets the grid, or got pages in this frame
-  std::vector<cl_uint> new_ranks_;   ///< rank of each added page within its cell; insert() appends added pages behind the sorted ones
-  /// The same on the device. cell_pages_list_: index of the first page of each cell, then the number of pages.
-  SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_, new_ranks_list_;
+  std::size_t sorted_pages_ = 0;     ///< those before added ones
+  /// The same on the device, where only the sorted ones have cells. cell_pages_list_: index of the first page of each cell, then the number
+  /// of pages.
+  SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_;
 
-  // Insertion
-  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_, order_, new_count_;
+  // Insertion. missing_before_: of each cell, pages that the cells before it need in addition to those that they have
+  DeviceArray<cl_uint> histogram_, cell_begin_, free_before_, missing_before_, order_, new_count_;
   DeviceArray<cl_ulong> nothing_;  ///< no surfel of any page of the window
   std::shared_ptr<const std::vector<cl_uint>> missing_told_;
+
+  // Frames that go on before the host has waited
+  DeviceArray<cl_uint> always_;    ///< [COUNTS] of other frames: they go on
+  cl::Buffer ahead_counts_;        ///< Doubts::counts
+  bool is_ahead_ = false;          ///< after go_ahead()
+  std::vector<Page> spare_pages_;  ///< the next ones of the index, listed on the device behind the window's; none where no frame goes ahead
+  std::size_t next_spares_ = 0;    ///< of the next frame
+  std::size_t next_kept_ = 0;      ///< surfels of the next frame that there should be room to keep
 
   // What a failed frame has overwritten
   Undo undo_;
@@ -210,10 +247,10 @@ class SurfelMap {
   DeviceArray<cl_uint4> kept_surfels_;
 
   // Changes
-  DeviceArray<cl_ulong> changed_words_;  ///< of this frame, one for each page of the window
-  std::vector<cl_ulong> frame_changes_;  ///< the same while changes are logged; else none
-  DeviceArray<cl_uchar> empty_;
-  std::vector<std::size_t> empty_pages_;  ///< indices in window_pages_
+  DeviceArray<cl_ulong> changed_words_;                              ///< of this frame, one for each page of the window
+  DeviceArray<cl_uchar> empty_;                                      ///< also for each page: 1 if the frame has left it empty
+  std::shared_ptr<const std::vector<cl_ulong>> changed_words_told_;  ///< the same while changes are logged; else none
+  std::shared_ptr<const std::vector<cl_uchar>> empty_told_;
   bool logs_changes_ = false;
   ChangeLog log_;
 };

@@ -35,29 +35,42 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
   kept_frames_.resize(count);
   kept_alive_.resize(count);
   kept_slots_.resize(count);
-  undo_.most_kept += freed_count;
-  kept_surfels_.grow(undo_.most_kept + 1, undo_.room, kSpare);
-  kept_surfel_slots_.grow(undo_.most_kept + 1, undo_.room, kSpare);
-  undo_.room = undo_.most_kept;
+  if (!is_ahead_) {
+    undo_.most_kept += freed_count;
+    make_room_to_keep(undo_.most_kept);
+  }
   if (first) {
     kept_count_.resize(1);
     kept_count_.fill(stage, 0, 1);
   }
   const std::size_t items = count * (commands_.shape().many_items ? PAGE_SLOTS : 1);
-  commands_.run(stage, "back_up_pages", items, PAGE_GROUP, pages_list_(), static_cast<cl_uint>(count), static_cast<cl_int>(first), freed(),
-                page_block_(), alive_(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room), kept_pages_(), kept_frames_(),
-                kept_alive_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
+  commands_.run(stage, "back_up_pages", items, PAGE_GROUP, goes_on(), pages_list_(), static_cast<cl_uint>(count),
+                static_cast<cl_int>(first), freed(), page_block_(), alive_(), changed_(), surfels_(), static_cast<cl_uint>(undo_.room),
+                kept_pages_(), kept_frames_(), kept_alive_(), kept_slots_(), kept_count_(), kept_surfel_slots_(), kept_surfels_());
   undo_.kept_pages = count;
 }
 
+void SurfelMap::make_room_to_keep(std::size_t surfels) {
+  if (surfels <= undo_.room && kept_surfels_.size() > 0) return;
+  kept_surfels_.grow(surfels + 1, undo_.room, kSpare);
+  kept_surfel_slots_.grow(surfels + 1, undo_.room, kSpare);
+  undo_.room = surfels;
+}
+
 std::vector<BlockKey> SurfelMap::commit(std::uint32_t frame) {
-  if (logs_changes_) log_.note(frame, window_pages_, frame_changes_);  // memory may run out: while the frame can still be undone
+  const std::size_t pages = window_pages();
+  if (logs_changes_)  // memory may run out: while the frame can still be undone
+    log_.note(frame, window_pages_, *changed_words_told_);
+  next_kept_ = 2 * undo_.most_kept;
   undo_ = {};
   std::vector<BlockKey> shrunk;
-  for (auto next = empty_pages_.begin(); next != empty_pages_.end();) {  // a block's pages lie together, but for new ones
-    const cl_uint cell = page_cells_[*next];
-    BlockIndex::Pages removed;
-    for (; next != empty_pages_.end() && page_cells_[*next] == cell; ++next) removed.push_back(window_pages_[*next]);
+  const auto is_empty = [&](std::size_t n) { return (*empty_told_)[n] != 0; };
+  for (std::size_t n = 0; n < pages; ++n) {
+    if (!is_empty(n)) continue;
+    const cl_uint cell = page_cells_[n];
+    BlockIndex::Pages removed = {window_pages_[n]};  // a block's pages lie together, but for new ones
+    for (; n + 1 < pages && page_cells_[n + 1] == cell; ++n)
+      if (is_empty(n + 1)) removed.push_back(window_pages_[n + 1]);
     shrunk.push_back(window_.block(static_cast<int>(cell)));
     index_.remove_pages(shrunk.back(), removed, removal(frame));
   }
@@ -90,12 +103,15 @@ void SurfelMap::restore() {
   changed_.fill(stage, 0, changed_.size());
   const auto count = static_cast<cl_uint>(undo_.kept_pages);
   if (count > 0) {
-    commands_.run(stage, "restore_pages", count, kGroup, kept_pages_(), count, kept_frames_(), kept_alive_(), page_block_(), alive_());
+    commands_.run(stage, "restore_pages", count, kGroup, undo_.ahead ? ahead_counts_ : always_(), kept_pages_(), count, kept_frames_(),
+                  kept_alive_(), page_block_(), alive_());
     const cl_uint kept = std::min(kept_count_.read_one(0), static_cast<cl_uint>(undo_.room));
     if (kept > 0) commands_.run(stage, "restore_surfels", kept, kGroup, kept, kept_surfel_slots_(), kept_surfels_(), surfels_());
   }
   for (const auto& [page, alive] : undo_.dropped) alive_.write({alive}, page);
   for (const auto& [block, page] : undo_.new_pages) alive_.write({0}, page);
+  if (undo_.ahead)
+    for (const Page page : spare_pages_) alive_.write({0}, page);
   commands_.wait();  // nothing of the failed frame may still run when its values go
   commands_.forget_times();
 }

@@ -73,16 +73,10 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   taking_back.look(camera, views, seen, &frame);
 
   // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split
-  const SurfelVisit::Found found = propose_changes(image, camera, frame, report);
-  map.reserve(report.created);  // the map's own memory is enlarged before anything is removed
-
-  // Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16)
-  remove_surfels(commands, visit.removed(), found.removed, map);
-  report.removed = found.removed;
-  creation.insert(map);
-
-  // Labels and colour - 3.5
-  label_surfels(commands, frame, camera, observed.column_end(), map);
+  if (!propose_changes(image, camera, frame, report)) {
+    map.reserve(report.created);  // the map's own memory is enlarged before anything is removed
+    carry_out(frame, camera, report.removed);
+  }
 
   finish_frame(number, image, camera, pose, report);
   report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -114,8 +108,10 @@ double Mapper::Impl::seen_spacing(const Camera& camera) const {
 }
 
 /// The device does all of it before the host asks what has come of it. In few frames it has to be done again: surfels were too large, space
-/// is taken back, or there were far more candidates than in the last frame.
-SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
+/// is taken back, or there were far more candidates than in the last frame. Where waiting costs much, the device also carries the changes
+/// out, unless it finds that the host must look at them first.
+/// @return whether they have been carried out
+bool Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
   // Does this frame take space back? If one of the frames just before it did, the host waits for the answer at once. Else the frame goes on
   // as if it did not
   bool is_judged = taking_back.is_likely();
@@ -150,7 +146,11 @@ SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Came
 
     list.voxels().read_length_later();
     creation.chosen().read_length_later();
+    const bool is_ahead = map.go_ahead("creation", {is_judged ? nullptr : taking_back.wanting(), list.voxels().length(),
+                                                    creation.chosen().length(), candidates.visit_counts()()});
+    if (is_ahead) carry_out(frame, camera, std::nullopt);
     const SurfelVisit::Found found = SurfelVisit::read_found(candidates, map);  // the host waits
+    if (is_ahead && !found.goes_on) map.stayed();
 
     // Space is taken back: then surfels float in it. Those that the visit has marked for labels too many leave the map, which marks them
     // as well
@@ -174,10 +174,21 @@ SurfelVisit::Found Mapper::Impl::propose_changes(const WorkingImage& image, Came
     creation.chosen().note_length();
     if (all_listed && all_chosen) {
       report.created = creation.chosen().count();
-      return found;
+      report.removed = found.removed;
+      if (found.goes_on) map.went_on(report.removed, report.created);
+      return found.goes_on;
     }
     if (!all_listed) creation.chosen().expect(list.voxels().total());  // not all could be chosen
   }
+}
+
+/// Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16) -, labels and colour - 3.5.
+/// @param removed  number of surfels that leave the map; none if the host does not know it yet
+void Mapper::Impl::carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed) {
+  remove_surfels(commands, visit.removed(), removed, map);
+  creation.insert(map);
+  label_surfels(commands, frame, camera, observed.column_end(), map);
+  map.finish_frame("labels", static_cast<std::uint32_t>(sequence + 1));
 }
 
 /// Repeats itself if larger surfels have come than any before, because the window around the view becomes larger then.
@@ -189,7 +200,6 @@ void Mapper::Impl::fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T
 
 void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image, const Camera& camera, const CorrectedPose& pose,
                                 Report& report) {
-  map.finish_frame("labels", number);
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
   if (stage_times_every() > 1) commands.time_stages(false);
   taking_back.add_to_last_frames(camera, image, pose.T_world_camera, views.current_number());

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kInitialRoom = 1 << 14;  // elements of a list
-constexpr std::size_t kLeastRoom = 1 << 12;    // elements of a list for which kernels are launched unseen
+constexpr std::size_t kLeastRoom = 1 << 14;    // elements of a list for which kernels are launched unseen
 
 /// @throws BadFrame  a list would be longer than Lists::kMaxTotal
 void refuse_too_many(const char* stage, std::uint32_t total) {

@@ -2,17 +2,19 @@
 
 namespace frontier_surfels {
 
-void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map) {
+void remove_surfels(Commands& commands, const BitField& removed, std::optional<std::size_t> count, SurfelMap& map) {
   const std::size_t pages = map.window_pages();
-  map.back_up("removal", removed, count);
-  commands.run("removal", "remove_surfels", pages, kGroup, map.pages(), static_cast<cl_uint>(pages), removed(), map.alive(), map.changed());
-  map.removed(count);
+  map.back_up("removal", removed, count.value_or(0));
+  commands.run("removal", "remove_surfels", pages, kGroup, map.goes_on(), map.pages(), static_cast<cl_uint>(pages), removed(), map.alive(),
+               map.changed());
+  map.removed(count.value_or(0));
 }
 
 void label_surfels(Commands& commands, const Frame& frame, const Camera& camera, const DeviceArray<cl_int>& column_end, SurfelMap& map) {
-  const std::size_t pages = map.window_pages();
-  commands.run("labels", "label_surfels", PAGE_SLOTS / commands.lanes() * pages, PAGE_GROUP, frame, camera.depth()(), column_end(),
-               camera.color()(), map.pages(), static_cast<cl_uint>(pages), map.alive(), map.changed(), map.page_block(), map.surfels());
+  const std::size_t pages = map.pages_to_change();
+  commands.run("labels", "label_surfels", PAGE_SLOTS / commands.lanes() * pages, PAGE_GROUP, map.goes_on(), frame, camera.depth()(),
+               column_end(), camera.color()(), map.pages(), static_cast<cl_uint>(pages), map.alive(), map.changed(), map.page_block(),
+               map.surfels());
 }
 
 }  // namespace frontier_surfels

@@ -17,7 +17,7 @@ void SurfelVisit::visit(const Frame& frame, const Camera& camera, const BitField
 SurfelVisit::Found SurfelVisit::read_found(Candidates& candidates, SurfelMap& map) {
   const std::vector<cl_uint> counts = candidates.visit_counts().read(COUNTS);
   map.marked(counts[COUNT_LABELLED]);
-  return {counts[COUNT_IN_VIEW], counts[COUNT_LARGE], counts[COUNT_REMOVED]};
+  return {counts[COUNT_IN_VIEW], counts[COUNT_LARGE], counts[COUNT_REMOVED], counts[COUNT_GOES_ON] != 0};
 }
 
 }  // namespace frontier_surfels

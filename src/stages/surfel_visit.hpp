@@ -12,6 +12,7 @@ class SurfelVisit {
  public:
   struct Found {
     std::size_t in_view = 0, large = 0, removed = 0;  ///< numbers of surfels
+    bool goes_on = false;                             ///< SurfelMap::go_ahead() was called, and the device has gone on
   };
 
   explicit SurfelVisit(Commands& commands);

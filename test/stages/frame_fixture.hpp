@@ -58,6 +58,7 @@ class FrameFixture {
   /// Ends the frame. @return what it has changed
   Changes finish(std::uint32_t frame) {
     map_.finish_frame("test", frame);
+    commands_.wait();
     map_.commit(frame);
     return map_.changes(frame - 1);
   }
