@@ -45,5 +45,26 @@ TEST_F(MapperDeviceFaultsAhead, AFrameThatSplits) {
 
 TEST_F(MapperDeviceFaultsAhead, ADeviceThatStaysAway) { stay_away(as_graphics_processor(), orbit_frames(small_camera(), 3, 6)); }
 
+/// Pages that the failed frame has filled, and that no block has, are empty after that.
+TEST_F(MapperDeviceFaultsAhead, ResetAfterAFrameThatCouldNotBeUndone) {
+  const Frames frames = orbit_frames(small_camera(), 3, 6);
+  const auto undisturbed = begin(as_graphics_processor(), frames, 2);
+  undisturbed->reset();
+  undisturbed->integrate(frames[2].view());
+  std::size_t refused = 0;
+  for (std::size_t n = 30; !HasFailure(); n += 3, ++refused) {
+    SCOPED_TRACE("from call " + std::to_string(n) + " on");
+    const auto mapper = begin(as_graphics_processor(), frames, 2);
+    if (refusal(*mapper, frames[2], n, kForEver).empty()) break;
+    FaultInjection::stop();
+    mapper->reset();
+    EXPECT_TRUE(mapper->surfels().empty());
+    mapper->integrate(frames[2].view());
+    EXPECT_TRUE(same(mapper->surfels(), undisturbed->surfels()));
+    EXPECT_EQ(mapper->size(), mapper->surfels().size());
+  }
+  EXPECT_GT(refused, 10u);
+}
+
 }  // namespace
 }  // namespace frontier_surfels

@@ -101,16 +101,19 @@ __kernel void sort_few(__global const uint* new_cells, __global const uint* leng
 
 // May the frame's changes be carried out before the host knows them? Not if the frame has to look for them again, because it takes space
 // back, splits surfels or has had no room for all entries of a list; nor if it needs more pages, or room to keep what it overwrites, than
-// there are. One work item decides. The kernels that change the map ask counts[COUNT_GOES_ON], which is always 1 where the host has waited.
-//   in  evidence[1]: number of pixels that want to take space back, where `asks`;  listed[2], chosen[2]: lengths of lists
+// there are. One work item decides. The kernels that come after it ask counts[COUNT_GOES_ON]: 16_removal, 18_labels and those below. Where
+// the host has waited they get counts that say 1.
+//   in  evidence[1]: number of pixels that want to take space back, if it `asks` for it;  listed[2], chosen[2]: lengths of lists
 //       missing_before[cells + 1];  spare: pages that the map can get;  room: surfels that can be kept
 //   i/o counts[COUNTS]
 __kernel void decide_to_go_on(__global const uint* evidence, const int asks, __global const uint* listed, __global const uint* chosen,
                               __global const uint* missing_before, const uint cells, const uint spare, const uint room,
                               __global uint* counts) {
   if (get_global_id(0) > 0) return;
-  const bool is_found = (!asks || evidence[0] == 0) && counts[COUNT_LARGE] == 0 && listed[0] == listed[1] && chosen[0] == chosen[1];
-  counts[COUNT_GOES_ON] = is_found && missing_before[cells] <= spare && counts[COUNT_REMOVED] + counts[COUNT_LABELLED] <= room ? 1 : 0;
+  const bool takes_back = (asks != 0) & (evidence[0] > 0), is_whole = (listed[0] == listed[1]) & (chosen[0] == chosen[1]);
+  const bool has_room = (missing_before[cells] <= spare) & (counts[COUNT_REMOVED] + counts[COUNT_LABELLED] <= room);
+  const bool goes_on = (!takes_back) & (counts[COUNT_LARGE] == 0) & is_whole & has_room;
+  counts[COUNT_GOES_ON] = goes_on ? 1 : 0;
 }
 
 // The cell whose block gets an added page: the last one with missing_before[cell] <= n.
@@ -233,6 +236,13 @@ __kernel void restore_pages(__global const uint* counts, __global const uint* ke
   const uint page = kept_pages[n];
   page_block[page].w = kept_frames[n];
   alive[page] = kept_alive[n];
+}
+
+// One work item handles a page that a failed frame may have added.
+//   in  pages[first + count]: the last ones;   out alive: of these, 0
+__kernel void clear_pages(__global const uint* pages, const uint first, const uint count, __global ulong* alive) {
+  const uint n = get_global_id(0);
+  if (n < count) alive[pages[first + n]] = 0;
 }
 
 // One work item handles a surfel that back_up_pages has kept.

@@ -5,7 +5,7 @@
 // the grid's rows and columns are filled up to whole tiles of VIEW_TILE.
 //   in  observed: bit field C~, with SPARE_WORDS behind it
 //   out candidates: bit field by tiles, of all their columns; voxels with a surfel that stays are among them
-//       counts[COUNTS]: 0, for what 5_visit counts next
+//       counts[COUNTS]: 0, for what 5_visit counts next and what decide_to_go_on decides
 __kernel void find_candidates(const Grid g, __global const ulong* observed, __global ulong* candidates, __global uint* counts) {
   if (get_global_id(0) < COUNTS) counts[get_global_id(0)] = 0;
   const int chunks = chunks_of(VIEW_TILE * grid_tiles(g.size_i)), i = LANES * (get_global_id(0) % chunks),

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "common/shared.h"
 #include "map/bits.hpp"
@@ -12,7 +11,7 @@ namespace frontier_surfels {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kLeastSpares = 1024;    // pages that a frame which goes ahead may add
+constexpr std::size_t kLeastSpares = 1024;  // pages that a frame which goes ahead may add
 constexpr std::size_t kGathered = 1 << 14;  // pages that are copied to the host at a time
 constexpr std::size_t kSpare = 16;          // buffers get 1 / kSpare more room than needed; on a CPU twice the room, because memory
                                             // costs nothing there until it is touched
@@ -95,9 +94,7 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   const double largest = std::max(largest_radius_, largest_created(grid));
   window_ = MapWindow(grid, T_world_camera, block_size_, window_margin(grid), {largest, thickness_});
   begin_undo();
-  is_ahead_ = false;
-  spare_pages_ = index_.next_pages(commands_.shape().is_near ? 0 : std::max(next_spares_, kLeastSpares));
-  grow(index_.end() + spare_pages_.size());
+  choose_spare_pages();
   largest_radius_ = largest;
   listed_cells_.clear();
   for (int cell = 0; cell < window_.cells(); ++cell) {
@@ -105,6 +102,19 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
     listed_cells_.push_back(index_.find(block) != nullptr && window_.meets_grid(block));
   }
   list_window();
+}
+
+/// Too little memory for pages that the frame may not need is no fault: it does not go ahead then.
+void SurfelMap::choose_spare_pages() {
+  if (commands_.shape().is_near) return;
+  spare_pages_ = index_.next_pages(std::max(next_spares_, kLeastSpares));
+  try {
+    grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end()));
+  } catch (const Error&) {
+    spare_pages_.clear();
+  } catch (const AllocationError&) {
+    spare_pages_.clear();
+  }
 }
 
 /// Lists the window's pages, sorted by cell.

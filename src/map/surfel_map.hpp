@@ -42,6 +42,9 @@ class SurfelMap {
   std::size_t window_pages() const { return window_pages_.size(); }
   const cl::Buffer& pages() const { return pages_list_(); }
 
+  /// Has the host called go_ahead(), and not been told yet what came of it?
+  bool is_ahead() const { return is_ahead_; }
+
   /// Pages in pages() that a frame's changes may touch: the window's, and after go_ahead() those behind them that the frame may add.
   std::size_t pages_to_change() const { return window_pages() + (is_ahead_ ? spare_pages_.size() : 0); }
 
@@ -74,21 +77,24 @@ class SurfelMap {
   /// @return false if insert() must be called, because the window has got pages in this frame; nothing was done
   bool sort_early(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
 
-  /// The other half, after that wait or after go_ahead(). @param count  the number of the surfels that were sorted; after go_ahead() it
-  ///                                                                    does not matter
+  /// The other half, after that wait. @param count  the number of the surfels that were sorted
   void insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count);
 
   /// What only the device knows, and what keeps a frame from going on before the host knows it, too.
   struct Doubts {
-    const cl::Buffer* evidence;         ///< [1]: pixels that want to take space back; null: none does
+    const cl::Buffer* evidence;         ///< [1]: number of pixels that want to take space back; null: it does not matter
     const cl::Buffer &listed, &chosen;  ///< [2]: lengths of the lists of candidates
     const cl::Buffer& counts;           ///< [COUNTS] of SurfelVisit; gets COUNT_GOES_ON
   };
 
-  /// After sort_early(): back_up(), insert_sorted(), finish_frame() and the stages between them may be called before the host has waited.
+  /// After sort_early(): back_up(), insert_ahead(), finish_frame() and the stages between them may be called before the host has waited.
   /// The device decides whether they change anything, and went_on() or stayed() must be called after the wait.
-  /// @return false if the host must wait first, because of the device, or as the frame has changed the map already; nothing was done
+  /// @return false if the host must wait first: on devices where that costs little, where the frame has changed the map already, or where
+  ///         there is too little memory for what the frame might need; nothing was done
   bool go_ahead(const char* stage, const Doubts& doubts);
+
+  /// The other half of sort_early(), after go_ahead().
+  void insert_ahead(const char* stage, const DeviceArray<cl_uint4>& surfels);
 
   /// The device has carried out what was called after go_ahead(). @param removed, added  numbers of surfels
   void went_on(std::size_t removed, std::size_t added);
@@ -172,7 +178,8 @@ class SurfelMap {
   struct Undo {
     bool open = false;                                 ///< something may have to be undone
     bool lost = false;                                 ///< replace() has begun
-    bool ahead = false;                                ///< only the device knows whether there is something to undo
+    bool ahead = false;                                ///< go_ahead() was called: the device knows whether there is something to undo
+    std::size_t spares_from = 0;                       ///< where spare_pages_ begin in pages_list_ then
     double largest_radius = 0;                         ///< [m]
     std::size_t size = 0, end = 0;                     ///< of the map, of the index
     std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them
@@ -190,6 +197,7 @@ class SurfelMap {
   void grow(std::size_t pages);
   double window_margin(const Grid& grid) const;
   void list_window();
+  void choose_spare_pages();
   void send_pages();
   void close_window();
   void add_missing_pages();
@@ -232,7 +240,7 @@ class SurfelMap {
   std::shared_ptr<const std::vector<cl_uint>> missing_told_;
 
   // Frames that go on before the host has waited
-  DeviceArray<cl_uint> always_;    ///< [COUNTS] of other frames: they go on
+  DeviceArray<cl_uint> always_;    ///< [COUNTS] that say: go on. Kernels get them where the host has decided
   cl::Buffer ahead_counts_;        ///< Doubts::counts
   bool is_ahead_ = false;          ///< after go_ahead()
   std::vector<Page> spare_pages_;  ///< the next ones of the index, listed on the device behind the window's; none where no frame goes ahead

@@ -65,10 +65,11 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   grow(packed.index.end());
   close_window();
   undo_.lost = true;
+  alive_.fill("replace", 0, alive_.size());  // a failed frame that could not be undone may have filled pages that no block has
+  changed_.fill("replace", 0, changed_.size());
   surfels_.write(packed.surfels);
   alive_.write(packed.alive);
   if (reserves_ids_) reserved_.write(packed.alive);
-  changed_.write(std::vector<cl_ulong>(packed.alive.size(), 0));  // a failed frame may have left bits
   page_block_.write(packed.page_block);
   index_ = std::move(packed.index);
   if (logs_changes_) log_.note_all(frame, index_.end());

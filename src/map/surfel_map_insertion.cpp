@@ -40,20 +40,27 @@ bool SurfelMap::sort_early(const char* stage, const NewCells& cells, const Devic
 
 bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
   if (spare_pages_.empty() || missing_told_ == nullptr || undo_.kept_pages > 0) return false;
-  make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept));
+  try {
+    make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept));
+  } catch (const Error&) {
+    return false;
+  } catch (const AllocationError&) {
+    return false;
+  }
   const auto room = static_cast<cl_uint>(undo_.room - undo_.most_kept), spare = static_cast<cl_uint>(spare_pages_.size());
   const cl::Buffer& evidence = doubts.evidence != nullptr ? *doubts.evidence : doubts.listed;  // a kernel takes no missing buffer
   commands_.run(stage, "decide_to_go_on", 1, 1, evidence, static_cast<cl_int>(doubts.evidence != nullptr), doubts.listed, doubts.chosen,
                 missing_before_(), static_cast<cl_uint>(window_.cells()), spare, room, doubts.counts);
   ahead_counts_ = doubts.counts;
   is_ahead_ = undo_.ahead = true;
+  undo_.spares_from = window_pages();
   return true;
 }
 
 void SurfelMap::went_on(std::size_t removed, std::size_t added) {
   is_ahead_ = false;
   undo_.most_kept += removed;
-  add_missing_pages();
+  add_missing_pages();  // there is room for them, and they have surfels already
   size_ += added;
   size_ -= removed;
 }
@@ -64,14 +71,17 @@ void SurfelMap::stayed() {
 }
 
 void SurfelMap::insert_sorted(const char* stage, const DeviceArray<cl_uint4>& surfels, std::size_t count) {
-  if (!is_ahead_) {
-    if (count == 0) return;
-    if (missing_told_ == nullptr) missing_told_ = std::make_shared<const std::vector<cl_uint>>(missing_before_.read(window_.cells() + 1));
-    add_missing_pages();
-    spare_pages_.clear();
-    if (sorted_pages_ < window_pages()) send_pages();
-    size_ += count;
-  }
+  if (count == 0) return;
+  if (missing_told_ == nullptr) missing_told_ = std::make_shared<const std::vector<cl_uint>>(missing_before_.read(window_.cells() + 1));
+  grow(index_.end() + missing_told_->back());
+  add_missing_pages();
+  spare_pages_.clear();
+  if (sorted_pages_ < window_pages()) send_pages();
+  size_ += count;
+  insert_ahead(stage, surfels);
+}
+
+void SurfelMap::insert_ahead(const char* stage, const DeviceArray<cl_uint4>& surfels) {
   const std::size_t pages = pages_to_change(), items = pages * (commands_.shape().many_items ? PAGE_SLOTS : 1);
   commands_.run(stage, "fill_pages", items, PAGE_GROUP, goes_on(), window_.window(), pages_list_(), page_cells_list_(),
                 static_cast<cl_uint>(pages), static_cast<cl_uint>(sorted_pages_), missing_before_(), cell_begin_(), cell_pages_list_(),
@@ -83,7 +93,6 @@ void SurfelMap::insert_sorted(const char* stage, const DeviceArray<cl_uint4>& su
 void SurfelMap::add_missing_pages() {
   const std::vector<cl_uint>& before = *missing_told_;
   next_spares_ = 2 * before.back();
-  grow(index_.end() + before.back());
   for (std::size_t cell = 0; cell + 1 < before.size(); ++cell)
     for (cl_uint n = before[cell]; n < before[cell + 1]; ++n) {
       window_pages_.push_back(add_page(window_.block(static_cast<int>(cell))));

@@ -18,6 +18,9 @@ void SurfelMap::begin_undo() {
   undo_.largest_radius = largest_radius_;
   undo_.size = size_;
   undo_.end = index_.end();
+  is_ahead_ = false;
+  spare_pages_.clear();
+  missing_told_ = nullptr;
 }
 
 /// Adds a page to a block of the index.
@@ -51,7 +54,7 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
 }
 
 void SurfelMap::make_room_to_keep(std::size_t surfels) {
-  if (surfels <= undo_.room && kept_surfels_.size() > 0) return;
+  if (surfels <= undo_.room && kept_surfel_slots_.size() > 0) return;  // the one that is enlarged last
   kept_surfels_.grow(surfels + 1, undo_.room, kSpare);
   kept_surfel_slots_.grow(surfels + 1, undo_.room, kSpare);
   undo_.room = surfels;
@@ -109,9 +112,12 @@ void SurfelMap::restore() {
     if (kept > 0) commands_.run(stage, "restore_surfels", kept, kGroup, kept, kept_surfel_slots_(), kept_surfels_(), surfels_());
   }
   for (const auto& [page, alive] : undo_.dropped) alive_.write({alive}, page);
-  for (const auto& [block, page] : undo_.new_pages) alive_.write({0}, page);
-  if (undo_.ahead)
-    for (const Page page : spare_pages_) alive_.write({0}, page);
+  if (undo_.ahead) {  // the pages that the frame has added are among these
+    const auto spares = static_cast<cl_uint>(spare_pages_.size());
+    commands_.run(stage, "clear_pages", spares, kGroup, pages_list_(), static_cast<cl_uint>(undo_.spares_from), spares, alive_());
+  } else {
+    for (const auto& [block, page] : undo_.new_pages) alive_.write({0}, page);
+  }
   commands_.wait();  // nothing of the failed frame may still run when its values go
   commands_.forget_times();
 }

@@ -98,7 +98,7 @@ struct Mapper::Impl {
   std::uint64_t stage_times_every() const;
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   double seen_spacing(const Camera& camera) const;
-  bool propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
+  bool find_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
   void carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(std::uint32_t number, const WorkingImage& image, const Camera& camera, const CorrectedPose& pose, Report& report);

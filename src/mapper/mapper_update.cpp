@@ -72,8 +72,8 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Taking back - ours: is there evidence that space behind measured surfaces, which was known, is unknown again?
   taking_back.look(camera, views, seen, &frame);
 
-  // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split
-  if (!propose_changes(image, camera, frame, report)) {
+  // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split. The device may have carried it out
+  if (!find_changes(image, camera, frame, report)) {
     map.reserve(report.created);  // the map's own memory is enlarged before anything is removed
     carry_out(frame, camera, report.removed);
   }
@@ -111,7 +111,7 @@ double Mapper::Impl::seen_spacing(const Camera& camera) const {
 /// is taken back, or there were far more candidates than in the last frame. Where waiting costs much, the device also carries the changes
 /// out, unless it finds that the host must look at them first.
 /// @return whether they have been carried out
-bool Mapper::Impl::propose_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
+bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report) {
   // Does this frame take space back? If one of the frames just before it did, the host waits for the answer at once. Else the frame goes on
   // as if it did not
   bool is_judged = taking_back.is_likely();

@@ -14,7 +14,8 @@ namespace frontier_surfels {
 /// bit.
 struct WorkShape {
   bool is_near = true;          ///< asking costs little: the host waits for the length of each list, so that no work item is idle, and
-                                ///< looks for what it wants in the device's memory, which is its own
+                                ///< looks for what it wants in the device's memory, which is its own; else the device also carries
+                                ///< out what it has found before the host knows of it
   bool many_items = false;      ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;  ///< group size for kernels with much work per item
   std::size_t tile_group = 1;   ///< and of settle_candidates, with its many barriers

@@ -18,7 +18,8 @@ class Candidates {
   const BitField& bits() const { return candidates_; }
   BitField& bits() { return candidates_; }
 
-  /// [COUNTS]: what SurfelVisit counts. find() sets them to zero, because a launch of its own would cost more than that work.
+  /// [COUNTS]: what SurfelVisit counts, and whether the frame goes on. find() sets them to zero, because a launch of its own would cost
+  /// more than that work.
   DeviceArray<cl_uint>& visit_counts() { return visit_counts_; }
 
  private:

@@ -33,7 +33,9 @@ void Creation::create(const Frame& frame, const Camera& camera, const RecentView
 }
 
 void Creation::insert(SurfelMap& map) const {
-  if (is_sorted_)
+  if (map.is_ahead())
+    map.insert_ahead(kStage, new_.surfels);
+  else if (is_sorted_)
     map.insert_sorted(kStage, new_.surfels, chosen_.count());
   else
     map.insert(kStage, new_.surfels, new_.cells, chosen_.count());

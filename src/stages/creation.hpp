@@ -22,7 +22,7 @@ class Creation {
   void create(const Frame& frame, const Camera& camera, const RecentViews& views, const SeenPoints& seen, const SeenPoints& taken,
               const ViewSettling& settling, const CandidateList& list, const BitField& leaving, SurfelMap& map);
 
-  /// Puts them into the map, once the host knows how many there are and the leaving ones have left.
+  /// Puts them into the map once the leaving ones have left it: when the host knows how many there are, or after SurfelMap::go_ahead().
   void insert(SurfelMap& map) const;
 
   DeviceList& chosen() { return chosen_; }  ///< place of each in the list of candidates, ascending

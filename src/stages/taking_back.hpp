@@ -46,7 +46,7 @@ class TakingBack {
   /// nothing has changed. Does not wait for the device: frame->has_taken says whether any point of the window may be taken.
   std::size_t give_back(const Camera& camera, const MapWindow& window, const WorkingImage& image, const RecentViews& views, Frame* frame);
 
-  /// [1], after look(): number of pixels that want to take space back. Null if none does.
+  /// [1], after look(): number of pixels that want to take space back. Null if space is never taken back.
   const cl::Buffer* wanting() const { return is_on_ ? &chosen_count_() : nullptr; }
 
   /// To be called after give_back(), once the host has waited for the device.
