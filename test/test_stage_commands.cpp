@@ -2,11 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "opencl/commands.hpp"
 #include "opencl/fault_injection.hpp"
+#include "opencl/programs.hpp"
 #include "stages/test_device.hpp"
 
 namespace frontier_surfels {
@@ -103,6 +107,25 @@ TEST(WorkShape, Teams) {
   EXPECT_EQ(shape.team(1 << 17), 2U);
   EXPECT_EQ(shape.team((1 << 17) + 1), 1U);
   EXPECT_EQ(shape.team(1 << 30), 1U);
+}
+
+/// Each program has all that its kernels call, and is built when one of them is launched, or before.
+TEST(StageKernelPrograms, AreBuiltByThemselves) {
+  const Device& device = test_commands().device();
+  std::map<std::string, int> programs;
+  for (const KernelProgram& program : kernel_programs()) {
+    SCOPED_TRACE(program.name);
+    std::set<std::string> told(program.kernels.begin(), program.kernels.end()), built;
+    for (const cl::Kernel& kernel : build_kernels(device, program.source, build_options(device), "").kernels)
+      built.insert(kernel.getInfo<CL_KERNEL_FUNCTION_NAME>());
+    EXPECT_TRUE(told == built) << told.size() << " kernels are told, and " << built.size() << " are built";
+    for (const std::string& name : built) ++programs[name];
+  }
+  EXPECT_EQ(programs.at("visit_surfels"), 1);
+  EXPECT_EQ(programs.at("sign_field"), 1);
+  EXPECT_EQ(programs.at("draw_views"), 1);
+  EXPECT_EQ(programs.at("list_bits"), 1);
+  EXPECT_GT(programs.size(), 60u);
 }
 
 }  // namespace

@@ -42,13 +42,21 @@ INLINE ulong all_bits(ulong8 words) {
   return of_2.x | of_2.y;
 }
 
-// Loads the words of the tiles one above the other.
-INLINE void load_words(__global const ulong* candidates, __local Tile* own) {
+// Loads the words of the tiles one above the other: whole words, or the part of each that this work-group is going to put back.
+INLINE void load_words(__global const ulong* candidates, int part, __local Tile* own) {
   const int item = get_local_id(0), items = get_local_size(0);
+#if LANES == 1
+  __global const ushort* parts = (__global const ushort*)candidates + part;
+  for (int column = item; column < TILE_COLUMNS; column += items) {
+    own->words[column] = (ulong)parts[WORD_TILES * column] << (part * VIEW_TILE_K);
+    own->taken[column] = 0;
+  }
+#else
   for (int row = item; row < VIEW_TILE; row += items) {
     vstore8(vload8(row, candidates), row, own->words);
     vstore8((ulong8)(0), row, own->taken);
   }
+#endif
   GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
   if (item == 0) {
     ulong8 words = 0;

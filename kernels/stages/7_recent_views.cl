@@ -207,7 +207,7 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
   const SeenPoints seen = {seen_slots, seen_tables, seen_bricks}, taken = {taken_slots, taken_tables, taken_bricks};
   __local Tile own;
   if (counts[COUNT_LARGE] > 0) return clear_words(&own, part, own_candidates);
-  load_words(own_candidates, &own);
+  load_words(own_candidates, part, &own);
   int3 tile = (int3)(word % tiles_i, word / tiles_i / f.grid.words_k, word / tiles_i % f.grid.words_k * WORD_TILES + part * GROUP_TILES);
   if ((GROUP_TILES == 1 ? own.layers & tile_mask(tile) : own.layers) == 0) return;
 

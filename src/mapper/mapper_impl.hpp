@@ -80,6 +80,7 @@ struct Mapper::Impl {
         state_blocks(commands),
         view_values(commands) {
     if (const std::string fault = arithmetic_fault(commands); !fault.empty()) warnings.push_back(fault);
+    if (!config.seen_points) commands.build(kKnownSpaceProgram);
     if (config.map_folder.empty()) return;
     archive = std::make_unique<MapArchive>(config, map, seen, views,
                                            [this] { return remembering.remember_forgotten(views, map.block_size(), seen); });

@@ -56,9 +56,7 @@ Commands::Commands(Device device) : device_(std::move(device)) {
     plain_queue_ = cl::CommandQueue(device_.context, device_.device);
     max_buffer_bytes_ = device_.device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
     device_bytes_ = device_.device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
-    const auto cache = !device_.is_pocl ? program_cache_folder() : std::filesystem::path();
-    for (const auto& kernel : build_kernels(device_, kernel_source(), build_options(device_), cache).kernels)
-      kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
+    build(kernel_programs().front());
   } catch (const cl::Error& error) {
     throw device_error(error);
   }
@@ -72,6 +70,25 @@ Commands::~Commands() {
   }
   retire(timed_queue_, device_);
   retire(plain_queue_, device_);
+}
+
+void Commands::build(const KernelProgram& program) {
+  const auto cache = !device_.is_pocl ? program_cache_folder() : std::filesystem::path();
+  for (const auto& kernel : build_kernels(device_, program.source, build_options(device_), cache).kernels)
+    kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
+}
+
+void Commands::build(const std::string& name) {
+  for (const KernelProgram& program : kernel_programs())
+    if (program.name == name && kernels_.count(program.kernels.front()) == 0) build(program);
+}
+
+cl::Kernel& Commands::kernel(const std::string& name) {
+  const auto found = kernels_.find(name);
+  if (found != kernels_.end()) return found->second;
+  for (const KernelProgram& program : kernel_programs())
+    if (std::find(program.kernels.begin(), program.kernels.end(), name) != program.kernels.end()) build(program);
+  return kernels_.at(name);
 }
 
 void Commands::wait() {

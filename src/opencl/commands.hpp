@@ -11,6 +11,7 @@
 #include "frontier_surfels/types.hpp"
 #include "opencl/device.hpp"
 #include "opencl/fault_injection.hpp"
+#include "opencl/programs.hpp"
 #include "opencl/work_shape.hpp"
 
 namespace frontier_surfels {
@@ -18,7 +19,7 @@ namespace frontier_surfels {
 /// Options with which the kernels are built for a device.
 std::string build_options(const Device& device);
 
-/// Builds all kernels once, launches them by name and records their times.
+/// Builds kernels when they are needed, launches them by name and records their times.
 class Commands {
  public:
   explicit Commands(Device device);
@@ -30,6 +31,9 @@ class Commands {
   const WorkShape& shape() const { return shape_; }
   std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
   std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
+
+  /// Builds a program now, by its name, and not when one of its kernels is launched first. @throws DeviceError  it does not build
+  void build(const std::string& program);
 
   /// The queue, for one command.
   cl::CommandQueue& queue(Call kind = Call::kLaunch) {
@@ -47,7 +51,7 @@ class Commands {
 
   template <typename... Args>
   void run(const char* stage, const char* kernel, const cl::NDRange& global, const cl::NDRange& local, const Args&... args) {
-    cl::Kernel& called = kernels_.at(kernel);
+    cl::Kernel& called = this->kernel(kernel);
     cl_uint number = 0;
     (called.setArg(number++, args), ...);
     timed(stage, [&](cl::Event* event) { queue().enqueueNDRangeKernel(called, cl::NullRange, global, local, nullptr, event); });
@@ -98,6 +102,8 @@ class Commands {
   std::string memory_text() const;  ///< what is allocated and what the device has, as a clause for people
 
  private:
+  void build(const KernelProgram& program);
+  cl::Kernel& kernel(const std::string& name);
   void claim(const cl::Buffer& buffer);
   cl::CommandQueue& queue_now() { return times_stages_ ? timed_queue_ : plain_queue_; }
 

@@ -8,6 +8,27 @@
 namespace frontier_surfels {
 namespace {
 
+bool starts_with(const std::string& text, const std::string& beginning) { return text.compare(0, beginning.size(), beginning) == 0; }
+
+/// The names of the kernels that a file defines.
+std::vector<std::string> kernels_in(const KernelFile& file) {
+  const std::string kernel = "\n__kernel ", type = "void ";
+  std::vector<std::string> names;
+  for (std::size_t at = file.text.find(kernel); at != std::string::npos; at = file.text.find(kernel, at + 1)) {
+    const std::size_t name = file.text.find(type, at) + type.size();
+    names.push_back(file.text.substr(name, file.text.find('(', name) - name));
+  }
+  return names;
+}
+
+/// The program that a file of kernels belongs to; "" for all. No function of one program is called in another.
+std::string program_of(const std::string& file) {
+  if (starts_with(file, "planner/")) return "planners";
+  for (const char* stage : {"10_", "11_", "12_", "13_", "14_"})
+    if (starts_with(file, std::string("stages/") + stage)) return kKnownSpaceProgram;
+  return starts_with(file, "common/") && file != "common/lists.cl" ? "" : "frames";
+}
+
 cl::Program build_source(const Device& device, const std::string& source, const std::string& options) {
   cl::Program program(device.context, source);
   try {
@@ -56,10 +77,21 @@ void keep(const cl::Program& program, const std::vector<cl::Kernel>& kernels, co
 
 }  // namespace
 
-std::string kernel_source() {
-  std::string text;
-  for (const auto& file : kernel_files()) text += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
-  return text;
+const std::vector<KernelProgram>& kernel_programs() {
+  static const std::vector<KernelProgram> programs = [] {
+    std::vector<KernelProgram> all = {{"frames", "", {}}, {kKnownSpaceProgram, "", {}}, {"planners", "", {}}};
+    for (const KernelFile& file : kernel_files()) {
+      const std::vector<std::string> kernels = kernels_in(file);
+      const std::string own = program_of(file.name);
+      for (KernelProgram& program : all) {
+        if (!own.empty() && program.name != own) continue;
+        program.source += "#line 1 \"" + file.name + "\"\n" + file.text + "\n";
+        program.kernels.insert(program.kernels.end(), kernels.begin(), kernels.end());
+      }
+    }
+    return all;
+  }();
+  return programs;
 }
 
 std::string program_identity(const cl::Device& device, const std::string& source, const std::string& options) {

@@ -14,8 +14,19 @@ struct BuiltKernels {
   bool from_cache = false;
 };
 
-/// All kernel files as one source. The compiler's messages name the file and its line.
-std::string kernel_source();
+/// Kernels that are built together. There are several such programs, because drivers take seconds for all of them, and few mappers need
+/// all.
+struct KernelProgram {
+  std::string name;                  ///< which kernels they are
+  std::string source;                ///< the compiler's messages name the file and its line
+  std::vector<std::string> kernels;  ///< names
+};
+
+/// Name of the program with the kernels of known space, which frames need where there are no seen points: KnownSpace.
+constexpr const char* kKnownSpaceProgram = "known space";
+
+/// All kernels. What every frame needs is in the first program.
+const std::vector<KernelProgram>& kernel_programs();
 
 /// Builds a program and makes all its kernels.
 /// @param cache  folder of kept programs, see program_cache.hpp; "": programs are not kept
