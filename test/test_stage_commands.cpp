@@ -83,7 +83,7 @@ TEST_F(StageCommands, ABufferThatCannotBeUsedReplacesNoOther) {
   EXPECT_GE(array.size(), 100 * kSize);
 }
 
-/// Each of them has its own values, and the order of the commands decides.
+/// Each of them has its own values, and the order of the commands decides. What is read later is what there is when the host waits.
 TEST_F(StageCommands, WritesAndReadsKeepTheirOrder) {
   array_.send(std::vector<cl_int>(kSize, 3));
   const auto first = array_.read_later(kSize);
@@ -92,9 +92,23 @@ TEST_F(StageCommands, WritesAndReadsKeepTheirOrder) {
   array_.send({5}, kSize - 1);
   std::vector<cl_int> wanted(kSize, 3);
   std::fill(wanted.begin(), wanted.begin() + kSize / 2, 4);
+  wanted.back() = 5;
   EXPECT_EQ(array_.read_one(kSize - 1), 5);
   EXPECT_EQ(*first, std::vector<cl_int>(kSize, 3));
   EXPECT_EQ(*second, wanted);
+}
+
+/// A driver may let the host wait for each read: all come together, just before the one wait.
+TEST_F(StageCommands, ReadsArePutOffToTheNextWait) {
+  FaultInjection::stop();
+  const auto values = array_.read_later(kSize);
+  array_.fill("test", 9, kSize);
+  EXPECT_EQ(FaultInjection::count(Call::kRead), 0u);
+  test_commands().wait();
+  EXPECT_EQ(FaultInjection::count(Call::kRead), 1u);
+  EXPECT_EQ(*values, std::vector<cl_int>(kSize, 9));
+  test_commands().wait();
+  EXPECT_EQ(FaultInjection::count(Call::kRead), 1u);
 }
 
 /// Fewer work items share a job where there are more jobs.
@@ -109,23 +123,32 @@ TEST(WorkShape, Teams) {
   EXPECT_EQ(shape.team(1 << 30), 1U);
 }
 
-/// Each program has all that its kernels call, and is built when one of them is launched, or before.
+/// Each program has all that its kernels call.
 TEST(StageKernelPrograms, AreBuiltByThemselves) {
   const Device& device = test_commands().device();
   std::map<std::string, int> programs;
   for (const KernelProgram& program : kernel_programs()) {
     SCOPED_TRACE(program.name);
-    std::set<std::string> told(program.kernels.begin(), program.kernels.end()), built;
+    std::set<std::string> listed(program.kernels.begin(), program.kernels.end()), built;
     for (const cl::Kernel& kernel : build_kernels(device, program.source, build_options(device), "").kernels)
       built.insert(kernel.getInfo<CL_KERNEL_FUNCTION_NAME>());
-    EXPECT_TRUE(told == built) << told.size() << " kernels are told, and " << built.size() << " are built";
+    EXPECT_TRUE(listed == built) << listed.size() << " kernels are listed, and " << built.size() << " are built";
     for (const std::string& name : built) ++programs[name];
   }
-  EXPECT_EQ(programs.at("visit_surfels"), 1);
-  EXPECT_EQ(programs.at("sign_field"), 1);
-  EXPECT_EQ(programs.at("draw_views"), 1);
-  EXPECT_EQ(programs.at("list_bits"), 1);
+  for (const char* once : {"visit_surfels", "list_bits", "mark_lines", "sign_field", "median", "draw_views"})
+    EXPECT_EQ(programs[once], 1) << once;
   EXPECT_GT(programs.size(), 60u);
+}
+
+/// They are built when one of their kernels is launched, or before.
+TEST(StageKernelPrograms, AreBuiltWhenTheyAreNeeded) {
+  Commands commands(test_commands().device());
+  EXPECT_TRUE(commands.has_built("frames"));
+  EXPECT_FALSE(commands.has_built(kKnownSpaceProgram) || commands.has_built(kPlannersProgram));
+  commands.build(kKnownSpaceProgram);
+  EXPECT_TRUE(commands.has_built(kKnownSpaceProgram));
+  EXPECT_FALSE(commands.has_built(kPlannersProgram));
+  EXPECT_THROW(commands.run("test", "no_such_kernel", 1, 1), std::out_of_range);
 }
 
 }  // namespace

@@ -74,6 +74,38 @@ TEST(StageMapPages, TheDeviceGoesOnByItself) {
   }
 }
 
+/// Too little memory for more pages: the frame gets those that there are.
+TEST(StageMapPages, TheDeviceGoesOnWithThePagesThatThereAre) {
+  if (test_commands().shape().is_near || small_tests()) return;
+  const Finding found;
+  Pages pages(7);
+  pages.fill(0);
+  pages.open_window(2);
+  pages.insert(70000, 40, 0);
+  pages.finish();
+  const auto room = [&] { return pages.map().bytes() + pages.map().untouched_bytes(); };
+  const std::size_t before = room();
+  std::size_t failing = 0;  // the number of the command that enlarges the map
+  for (std::string fault = "none yet"; !fault.empty(); ++failing) {
+    FaultInjection::fail(failing, 1);
+    try {
+      pages.open_window(3);
+      fault = "";
+    } catch (const cl::Error& error) {  // of a command before that
+      fault = error.what();
+      FaultInjection::stop();
+      pages.map().roll_back();
+    }
+  }
+  FaultInjection::stop();
+  EXPECT_LE(room(), before);
+  EXPECT_TRUE(pages.insert(500, 20, 0, &found));
+  pages.finish();
+  pages.expect_as_in_book();
+  pages.open_window(4);
+  EXPECT_GT(room(), before) << "there was no need to enlarge it";
+}
+
 /// A frame that fails after the device has gone on, or has not.
 TEST(StageMapPages, AFrameThatWentAheadIsUndone) {
   for (const cl_uint large : {0, 1}) {

@@ -18,7 +18,7 @@ namespace frontier_surfels {
 
 class Mapper {
  public:
-  /// Chooses the device and builds all kernels.
+  /// Chooses the device and builds the kernels that frames need.
   /// @throws Error        the configuration has problems; the message lists all of them
   /// @throws DeviceError  no device fits (the message lists all devices), or the kernels do not build
   /// @throws FileError    config.map_folder cannot be made, read or written, is in use by another mapper, has another block size, or
@@ -27,6 +27,10 @@ class Mapper {
   ~Mapper();
   Mapper(Mapper&&) noexcept;
   Mapper& operator=(Mapper&&) noexcept;
+
+  /// Builds the kernels that questions need, so that the first one need not wait for it. On a graphics processor this may take seconds if
+  /// they have never been built. @throws DeviceError  they do not build
+  void prepare_questions();
 
   /// Updates the map with a frame, Psi_n -> Psi_(n+1): one pass of the paper's flow chart.
   /// With a map_folder, first loads blocks near the camera into memory and moves far blocks out of memory.

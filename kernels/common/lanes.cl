@@ -22,7 +22,7 @@
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif
 
-#ifdef NOT_INLINED  // by scripts/test --oclgrind
+#ifdef NOT_INLINED  // set by scripts/test --oclgrind
 #define INLINE static __attribute__((noinline))
 #else
 #define INLINE static inline __attribute__((always_inline))

@@ -209,7 +209,7 @@ __kernel void settle_candidates(const Frame f, __global const View* views, __glo
   if (counts[COUNT_LARGE] > 0) return clear_words(&own, part, own_candidates);
   load_words(own_candidates, part, &own);
   int3 tile = (int3)(word % tiles_i, word / tiles_i / f.grid.words_k, word / tiles_i % f.grid.words_k * WORD_TILES + part * GROUP_TILES);
-  if ((GROUP_TILES == 1 ? own.layers & tile_mask(tile) : own.layers) == 0) return;
+  if (own.layers == 0) return;
 
   for (const int last_tile = tile.z + GROUP_TILES - 1; tile.z <= last_tile; ++tile.z) {
     if (tile_layers(own.layers, tile) == 0) continue;

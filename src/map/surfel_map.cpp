@@ -104,16 +104,23 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   list_window();
 }
 
-/// Too little memory for pages that the frame may not need is no fault: it does not go ahead then.
+/// Too little memory for pages that the frame may not need is no fault: it gets those that there are.
 void SurfelMap::choose_spare_pages() {
   if (commands_.shape().is_near) return;
   spare_pages_ = index_.next_pages(std::max(next_spares_, kLeastSpares));
+  const auto keep_those_there = [&] {
+    std::size_t room = std::min({surfels_.size() / PAGE_SLOTS, alive_.size(), changed_.size(), page_block_.size()});
+    if (reserves_ids_) room = std::min(room, reserved_.size());
+    const auto beyond = std::find_if(spare_pages_.begin(), spare_pages_.end(), [&](Page page) { return page >= room; });
+    spare_pages_.erase(beyond, spare_pages_.end());
+    next_spares_ = 0;
+  };
   try {
     grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end()));
   } catch (const Error&) {
-    spare_pages_.clear();
+    keep_those_there();
   } catch (const AllocationError&) {
-    spare_pages_.clear();
+    keep_those_there();
   }
 }
 

@@ -179,7 +179,7 @@ class SurfelMap {
     bool open = false;                                 ///< something may have to be undone
     bool lost = false;                                 ///< replace() has begun
     bool ahead = false;                                ///< go_ahead() was called: the device knows whether there is something to undo
-    std::size_t spares_from = 0;                       ///< where spare_pages_ begin in pages_list_ then
+    std::size_t spares_from = 0;                       ///< where spare_pages_ begin in pages_list_
     double largest_radius = 0;                         ///< [m]
     std::size_t size = 0, end = 0;                     ///< of the map, of the index
     std::vector<std::pair<BlockKey, Page>> new_pages;  ///< in the order in which the index got them

@@ -76,6 +76,7 @@ std::vector<std::uint32_t> SurfelMap::replace(const std::vector<Surfel>& surfels
   size_ = surfels.size();
   largest_radius_ = packed.largest_radius;
   undo_ = {};
+  is_ahead_ = false;
   return slots;
 }
 

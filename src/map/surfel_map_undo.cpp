@@ -98,6 +98,8 @@ void SurfelMap::roll_back() {
     index_.take_back(block, page, undo_.end);
   }
   undo_ = {};
+  is_ahead_ = false;
+  spare_pages_.clear();
 }
 
 /// The part of roll_back() that needs the device.

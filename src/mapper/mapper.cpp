@@ -14,6 +14,10 @@ Mapper::~Mapper() = default;
 Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
+void Mapper::prepare_questions() {
+  on_device(impl_->commands, [&] { impl_->commands.build(kPlannersProgram); });
+}
+
 Report Mapper::integrate(const DepthFrame& frame) {
   return on_device(impl_->commands, [&] { return impl_->integrate(frame); });
 }

@@ -72,7 +72,8 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   // Taking back - ours: is there evidence that space behind measured surfaces, which was known, is unknown again?
   taking_back.look(camera, views, seen, &frame);
 
-  // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split. The device may have carried it out
+  // What is found with the map as it is: which surfels leave it, and new ones. Large surfels are split. On some devices the map may have
+  // changed after that
   if (!find_changes(image, camera, frame, report)) {
     map.reserve(report.created);  // the map's own memory is enlarged before anything is removed
     carry_out(frame, camera, report.removed);

@@ -76,11 +76,12 @@ void Commands::build(const KernelProgram& program) {
   const auto cache = !device_.is_pocl ? program_cache_folder() : std::filesystem::path();
   for (const auto& kernel : build_kernels(device_, program.source, build_options(device_), cache).kernels)
     kernels_[kernel.getInfo<CL_KERNEL_FUNCTION_NAME>()] = kernel;
+  programs_.insert(program.name);
 }
 
 void Commands::build(const std::string& name) {
   for (const KernelProgram& program : kernel_programs())
-    if (program.name == name && kernels_.count(program.kernels.front()) == 0) build(program);
+    if (program.name == name && !has_built(name)) build(program);
 }
 
 cl::Kernel& Commands::kernel(const std::string& name) {
@@ -93,6 +94,7 @@ cl::Kernel& Commands::kernel(const std::string& name) {
 
 void Commands::wait() {
   if (!pending_) return;
+  enqueue_reads();
   FaultInjection::step(Call::kWait, "clFinish");
   queue_now().finish();
   waited();

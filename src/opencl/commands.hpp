@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,8 +34,9 @@ class Commands {
   std::size_t lanes() const { return static_cast<std::size_t>(device_.lanes); }            ///< entries that one work item handles: LANES
   std::size_t chunks(std::size_t count) const { return (count + lanes() - 1) / lanes(); }  ///< work items for `count` entries
 
-  /// Builds a program now, by its name, and not when one of its kernels is launched first. @throws DeviceError  it does not build
+  /// Builds a program, by its name, now rather than when one of its kernels is first launched. @throws DeviceError  it does not build
   void build(const std::string& program);
+  bool has_built(const std::string& program) const { return programs_.count(program) > 0; }
 
   /// The queue, for one command.
   cl::CommandQueue& queue(Call kind = Call::kLaunch) {
@@ -89,6 +92,18 @@ class Commands {
   /// Drops the times, without waiting.
   void forget_times() { events_.clear(); }
 
+  /// Puts a read off to the next command that waits. Drivers of graphics processors may let the host wait for each read, also for one that
+  /// does not block: into memory that is not pinned CUDA copies at once, after all that was launched before. @param read  enqueues it
+  void read_later(std::function<void()> read) {
+    pending_ = true;
+    reads_.push_back(std::move(read));
+  }
+
+  /// Enqueues what was put off: to be called before each command that waits. If one fails, the others are dropped.
+  void enqueue_reads() {
+    for (const auto& read : std::exchange(reads_, {})) read();
+  }
+
   /// Keeps values that a command reads or writes alive until the host has waited for it.
   void keep(std::shared_ptr<const void> values) { kept_.push_back(std::move(values)); }
 
@@ -111,8 +126,10 @@ class Commands {
   WorkShape shape_;
   cl::CommandQueue timed_queue_, plain_queue_;  ///< one of them has commands at a time
   std::map<std::string, cl::Kernel> kernels_;
+  std::set<std::string> programs_;  ///< that were built
   std::vector<std::pair<std::string, cl::Event>> events_;
   std::vector<std::shared_ptr<const void>> kept_;
+  std::vector<std::function<void()>> reads_;
   std::size_t allocated_bytes_ = 0, max_buffer_bytes_ = 0, device_bytes_ = 0;
   bool pending_ = false;       ///< commands may still run
   bool times_stages_ = false;  ///< launches have events; outside of a mapper's frames only on a CPU, where it costs nothing
@@ -162,6 +179,7 @@ class DeviceArray {
   /// Writes values from element `offset` on, growing if needed, and waits for all commands. Elements before `offset` stay.
   void write(const std::vector<T>& values, std::size_t offset = 0) {
     if (values.empty()) return;
+    commands_->enqueue_reads();
     grow(offset + values.size(), offset);
     commands_->queue(Call::kUpload).enqueueWriteBuffer(buffer_, CL_TRUE, offset * sizeof(T), values.size() * sizeof(T), values.data());
     commands_->wait();  // drivers may return from a blocking write while earlier commands have not begun
@@ -187,17 +205,21 @@ class DeviceArray {
   std::vector<T> read(std::size_t size, std::size_t offset = 0) const {
     std::vector<T> values(size);
     if (size == 0) return values;
+    commands_->enqueue_reads();
     FaultInjection::waits();
     commands_->queue(Call::kRead).enqueueReadBuffer(buffer_, CL_TRUE, offset * sizeof(T), size * sizeof(T), values.data());
     commands_->waited();
     return values;
   }
 
-  /// As read(), but does not wait: the values are there after the next command that does.
+  /// As read(), but does not wait: the values are there after the next command that does, as they are then.
   std::shared_ptr<const std::vector<T>> read_later(std::size_t size) const {
     const auto values = std::make_shared<std::vector<T>>(size);
-    commands_->keep(values);
-    if (size > 0) commands_->queue(Call::kRead).enqueueReadBuffer(buffer_, CL_FALSE, 0, size * sizeof(T), values->data());
+    if (size > 0)
+      commands_->read_later([commands = commands_, buffer = buffer_, values] {
+        commands->keep(values);
+        commands->queue(Call::kRead).enqueueReadBuffer(buffer, CL_FALSE, 0, values->size() * sizeof(T), values->data());
+      });
     return values;
   }
 

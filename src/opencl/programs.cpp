@@ -8,7 +8,7 @@
 namespace frontier_surfels {
 namespace {
 
-bool starts_with(const std::string& text, const std::string& beginning) { return text.compare(0, beginning.size(), beginning) == 0; }
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// The names of the kernels that a file defines.
 std::vector<std::string> kernels_in(const KernelFile& file) {
@@ -23,10 +23,10 @@ std::vector<std::string> kernels_in(const KernelFile& file) {
 
 /// The program that a file of kernels belongs to; "" for all. No function of one program is called in another.
 std::string program_of(const std::string& file) {
-  if (starts_with(file, "planner/")) return "planners";
-  for (const char* stage : {"10_", "11_", "12_", "13_", "14_"})
-    if (starts_with(file, std::string("stages/") + stage)) return kKnownSpaceProgram;
-  return starts_with(file, "common/") && file != "common/lists.cl" ? "" : "frames";
+  if (contains(file, "planner/")) return kPlannersProgram;
+  for (const char* stage : {"needed_paths", "sign_field", "known_hull", "sweeps", "median"})
+    if (contains(file, std::string("_") + stage + ".cl")) return kKnownSpaceProgram;
+  return contains(file, "common/") && !contains(file, "/lists.cl") ? "" : "frames";
 }
 
 cl::Program build_source(const Device& device, const std::string& source, const std::string& options) {
@@ -34,8 +34,9 @@ cl::Program build_source(const Device& device, const std::string& source, const 
   try {
     program.build({device.device}, options.c_str());
   } catch (const cl::Error&) {
-    throw DeviceError("The kernels do not build on " + device.description + " with " + options + ":\n" +
-                      program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device.device));
+    const std::string log = program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device.device);
+    if (log.empty()) throw;  // it is not the compiler that has failed
+    throw DeviceError("The kernels do not build on " + device.description + " with " + options + ":\n" + log);
   }
   return program;
 }
@@ -79,7 +80,7 @@ void keep(const cl::Program& program, const std::vector<cl::Kernel>& kernels, co
 
 const std::vector<KernelProgram>& kernel_programs() {
   static const std::vector<KernelProgram> programs = [] {
-    std::vector<KernelProgram> all = {{"frames", "", {}}, {kKnownSpaceProgram, "", {}}, {"planners", "", {}}};
+    std::vector<KernelProgram> all = {{"frames", "", {}}, {kKnownSpaceProgram, "", {}}, {kPlannersProgram, "", {}}};
     for (const KernelFile& file : kernel_files()) {
       const std::vector<std::string> kernels = kernels_in(file);
       const std::string own = program_of(file.name);

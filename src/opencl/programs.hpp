@@ -22,8 +22,11 @@ struct KernelProgram {
   std::vector<std::string> kernels;  ///< names
 };
 
-/// Name of the program with the kernels of known space, which frames need where there are no seen points: KnownSpace.
-constexpr const char* kKnownSpaceProgram = "known space";
+/// @name Programs that are built when they are needed
+/// @{
+constexpr const char* kKnownSpaceProgram = "known space";  ///< for frames, where there are no seen points: KnownSpace
+constexpr const char* kPlannersProgram = "planners";       ///< for questions
+/// @}
 
 /// All kernels. What every frame needs is in the first program.
 const std::vector<KernelProgram>& kernel_programs();

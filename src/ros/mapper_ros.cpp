@@ -99,6 +99,7 @@ class MapperRos::Impl {
 
 MapperRos::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pnh)
     : nh_(nh), pnh_(pnh), config_(read_and_warn(pnh)), mapper_(config_.mapper), poses_(config_.world_frame) {
+  mapper_.prepare_questions();  // a planner's first question must not hold up the mapping of a robot that moves
   reports_ = pnh_.advertise<FrameReport>("report", 100);
   worker_ = std::make_unique<Worker>([this] { return map_next(); }, [this] { after_work(); });
   publisher_ = std::make_unique<MapPublisher>(pnh_, config_, [this] { worker_->wake(); });
