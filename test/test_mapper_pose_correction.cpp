@@ -33,7 +33,10 @@ class RandomJitter {
   std::normal_distribution<double> normal_;
 };
 
-WorkingImage working(const replay::RecordedFrame& frame) { return make_working_image(frame.view(), undecimated(), kVoxels); }
+WorkingImage working(const replay::RecordedFrame& frame) {
+  RowWorkers workers(1);
+  return make_working_image(frame.view(), undecimated(), kVoxels, workers);
+}
 
 /// A frame as a reference for others.
 ReferenceFrame reference(const replay::RecordedFrame& frame) { return {frame.T_world_camera, inverse_depths(working(frame))}; }
@@ -135,6 +138,7 @@ std::vector<Eigen::Isometry3d> corrected(PoseCorrection& correction, const Frame
   for (std::size_t n = 0; n < frames.size(); ++n) {
     const WorkingImage image = working(frames[n]);
     const CorrectedPose pose = correction.correct(image, recorded[n]);
+    correction.prepare(image);
     correction.add(image, pose);
     poses.push_back(pose.T_world_camera);
   }
@@ -213,7 +217,9 @@ TEST(PoseCorrection, CamerasHaveLastFramesOfTheirOwn) {
     const WorkingImage image = working(frames[n]);
     const CorrectedPose pose = shared.correct(image, recorded[n]);
     EXPECT_TRUE(pose.T_world_camera.matrix() == wanted[n].matrix());
+    shared.prepare(image);
     shared.add(image, pose);
+    shared.prepare(other);
     shared.add(other, shared.correct(other, jitter(recorded[n])));
   }
 }

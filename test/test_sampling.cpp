@@ -45,7 +45,10 @@ struct Image {
     if (!color.empty()) frame.color = ColorImage{width, height, width * 3UL, ColorImage::Order::kRgb, 3, color.data()};
     return frame;
   }
-  WorkingImage working(const Config& config) const { return make_working_image(frame(), config, kVoxels); }
+  WorkingImage working(const Config& config) const {
+    RowWorkers workers(config.threads);
+    return make_working_image(frame(), config, kVoxels, workers);
+  }
 };
 
 /// Surfaces with noise, gaps, outliers, and everything else that images have in them.
@@ -132,7 +135,8 @@ TEST(Sampling, HowDepthsAreWrittenMakesNoDifference) {
         frame.depth.swap_bytes = swap;
         frame.depth.data = &all.bytes[1];
         SCOPED_TRACE("image " + std::to_string(n) + (swap ? ", swapped" : "") + (in_steps ? ", in steps" : ", in metres"));
-        expect_equal(make_working_image(frame, config, kVoxels), expected);
+        RowWorkers workers(config.threads);
+        expect_equal(make_working_image(frame, config, kVoxels, workers), expected);
       }
   }
 }

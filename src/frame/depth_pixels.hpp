@@ -1,6 +1,7 @@
 /// How the pixels of depth images are read: the mapper, and what counts their faults, must agree.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 
@@ -16,7 +17,10 @@ inline std::uint32_t swapped(std::uint32_t value) { return __builtin_bswap32(val
 
 /// Depth of a 16-bit pixel [m]; 0: no measurement. @param depth_unit  Config::depth_unit
 inline float to_metres(std::uint16_t steps, double depth_unit) {
-  const std::uint16_t measured = steps == kSaturated ? 0 : steps;  // chosen among 16 bits: vectors hold more of them
+  // kSaturated becomes 0, and all others stay as they are, without a choice: of one, the compiler makes masks of 64 bits
+  const auto next = static_cast<std::uint16_t>(steps + 1);
+  static_assert(static_cast<std::uint16_t>(kSaturated + 1) == 0);
+  const auto measured = static_cast<std::uint16_t>(std::max<std::uint16_t>(next, 1) - 1);
   return static_cast<float>(measured * depth_unit);
 }
 

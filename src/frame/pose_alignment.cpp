@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "frame/wide_vectors.hpp"
+
 namespace frontier_surfels {
 namespace {
 
@@ -146,7 +148,7 @@ struct Seen {
 /// The product of a row of a matrix, or of a column, and a vector. The order of the sum is Eigen's.
 float product(const Eigen::Vector3f& row, float x, float y, float z) { return row[0] * x + (row[1] * y + row[2] * z); }
 
-void project(const Batch& batch, const Target& target, const Pinhole& camera, Seen& seen) {
+WIDE_VECTORS void project(const Batch& batch, const Target& target, const Pinhole& camera, Seen& seen) {
   const Eigen::Matrix3f R = target.R_reference_camera.transpose();  // its columns are the rows
   const Eigen::Vector3f t = target.t_reference_camera;
   const Eigen::Vector3f row_x = R.col(0), row_y = R.col(1), row_z = R.col(2);
@@ -170,7 +172,7 @@ void project(const Batch& batch, const Target& target, const Pinhole& camera, Se
 }
 
 /// The inverse depths of a reference at the points of a batch, between their four pixels. 0: these do not measure one surface
-void find_inverse_depths(const Seen& seen, const float* inverse_depth, int width, Numbers& inverse) {
+WIDE_VECTORS void find_inverse_depths(const Seen& seen, const float* inverse_depth, int width, Numbers& inverse) {
   std::array<Numbers, 4> corners;  // upper left, upper right, lower left, lower right
   for (std::size_t n = 0; n < kBatch; ++n) {
     const float* upper = inverse_depth + seen.pixel[n];
@@ -230,7 +232,7 @@ class Equations {
   }
 
   /// Adds the distances of the points from a reference, where they count.
-  void weigh(const Batch& batch, const Target& target, Weights& weights) const {
+  WIDE_VECTORS void weigh(const Batch& batch, const Target& target, Weights& weights) const {
     Seen seen;
     Numbers inverse;
     project(batch, target, camera_, seen);
@@ -285,7 +287,7 @@ Motion solve(const Sums& sums, const Motion& recorded) {
 
 }  // namespace
 
-std::vector<float> inverse_depths(const WorkingImage& image, std::vector<float> room) {
+WIDE_VECTORS std::vector<float> inverse_depths(const WorkingImage& image, std::vector<float> room) {
   room.resize(image.depth.size());
   std::transform(image.depth.begin(), image.depth.end(), room.begin(), [](float depth) {
     const float inverse_depth = 1 / depth;

@@ -68,15 +68,19 @@ CorrectedPose PoseCorrection::correct(const WorkingImage& image, const Eigen::Is
   return {moved(*aligned, {deviations.shift.value * back.shift, deviations.turn.value * back.turn}, centre), deviations};
 }
 
+void PoseCorrection::prepare(const WorkingImage& image) {
+  if (config_.correct_poses) prepared_ = inverse_depths(image, std::move(prepared_));
+}
+
 void PoseCorrection::add(const WorkingImage& image, const CorrectedPose& pose) {
   if (!config_.correct_poses) return;
   History& history = histories_.use(image.intrinsics, image.intrinsics);
-  std::vector<float> room;
+  std::vector<float> unused;
   if (history.last.size() == kFrames) {
-    room = std::move(history.last.back().inverse_depth);
+    unused = std::move(history.last.back().inverse_depth);
     history.last.pop_back();
   }
-  history.last.push_front({pose.T_world_camera, inverse_depths(image, std::move(room))});
+  history.last.push_front({pose.T_world_camera, std::exchange(prepared_, std::move(unused))});
   history.deviations = pose.deviations;
   ++history.frames;
 }

@@ -43,7 +43,10 @@ class PoseCorrection {
   /// @param T_world_camera  the recorded pose
   CorrectedPose correct(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera) const;
 
-  /// Remembers a frame that has been mapped.
+  /// The part of add() that does not depend on whether the frame is mapped.
+  void prepare(const WorkingImage& image);
+
+  /// Remembers a frame that has been mapped, the one that was prepared last.
   void add(const WorkingImage& image, const CorrectedPose& pose);
 
   void clear() { histories_.clear(); }
@@ -66,6 +69,7 @@ class PoseCorrection {
 
   Config config_;
   CameraList<History> histories_;
+  std::vector<float> prepared_;  ///< inverse depths of the frame that was prepared last
 };
 
 }  // namespace frontier_surfels

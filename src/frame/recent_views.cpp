@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 
+#include "frame/wide_vectors.hpp"
 #include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
@@ -83,7 +84,7 @@ struct KeptDepths {
   float deepest = 0;              ///< [m]
 };
 
-KeptDepths kept_depths(const WorkingImage& image, float per_step) {
+WIDE_VECTORS KeptDepths kept_depths(const WorkingImage& image, float per_step) {
   const int width = image.intrinsics.width, height = image.intrinsics.height, columns = patches(width, PATCH_COLUMNS),
             across = patches(width, VIEW_BLOCK);
   KeptDepths kept = {std::vector<cl_ushort>(room_for(width, height)), 0};

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "frame/depth_pixels.hpp"
+#include "frame/wide_vectors.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -100,7 +101,7 @@ void DepthRows::move_to(int t) {
 
 /// All depths far beyond z_max are alike. The blank pixels beside the image stay as they are. The common decimations have loops of their
 /// own, of which the compiler makes vectors.
-void DepthRows::read(int row, float* planes) {
+WIDE_VECTORS void DepthRows::read(int row, float* planes) {
   const auto of_float = [no_return = no_return_, far = far_](float raw) {
     const float depth = raw == std::numeric_limits<float>::infinity() ? no_return : std::min(raw, far);
     return raw > 0 ? depth : 0;
@@ -139,7 +140,7 @@ BandSampler::BandSampler(const Sampling& sampling, const DepthImage& image, int 
       is_odd_(width) {}
 
 /// With the middle pixels as pivots.
-void BandSampler::begin_count(const float* pivots) {
+WIDE_VECTORS void BandSampler::begin_count(const float* pivots) {
   const int width = static_cast<int>(sum_.size());
   const Sampling sampling = sampling_;  // a copy, which the loop does not change
   float* __restrict__ lowest = lowest_.data(), * __restrict__ highest = highest_.data();
@@ -153,7 +154,7 @@ void BandSampler::begin_count(const float* pivots) {
 
 /// The loops over the blocks of the row are the inner ones, so that the compiler makes vectors of them, but several pixels of each block
 /// are counted at once: sums that stay in registers need not be fetched.
-void BandSampler::count(int t) {
+WIDE_VECTORS void BandSampler::count(int t) {
   const int width = static_cast<int>(sum_.size()), radius = sampling_.radius_;
   const auto add = [&](const auto& depth) {
     count_columns(depth, width, lowest_.data(), highest_.data(), sum_.data(), agree_.data(), farther_.data(), measured_.data());
@@ -170,7 +171,8 @@ void BandSampler::count(int t) {
 
 /// What the counts say of the blocks of a row: of all but the odd ones, of which the pixels must be looked at again. In two loops, because
 /// the compiler makes vectors of none that does it all.
-void BandSampler::take_means(const float* pivots, float* __restrict__ means, float* __restrict__ pivots_used, int* __restrict__ whole) {
+WIDE_VECTORS void BandSampler::take_means(const float* pivots, float* __restrict__ means, float* __restrict__ pivots_used,
+                                          int* __restrict__ whole) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const int width = static_cast<int>(sum_.size()), edge = 2 * sampling_.radius_ + 1, all = edge * edge, least = sampling_.least_;
   const float* sum = sum_.data();

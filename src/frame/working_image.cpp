@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "frame/depth_pixels.hpp"
-#include "frame/row_bands.hpp"
 #include "frame/sampling.hpp"
 #include "frame/view_grid.hpp"
+#include "frame/wide_vectors.hpp"
 #include "frontier_surfels/number_text.hpp"
 
 namespace frontier_surfels {
@@ -63,12 +63,13 @@ void check_color(const ColorImage& color, const DepthImage& depth) {
 }
 
 /// Depths of every decimation-th pixel in both directions, as DepthMeaning says.
-std::vector<float> read_depth(const DepthImage& image, const Config& config) {
-  const int step = config.decimation, width = image.width / step, height = image.height / step;
+/// @param depth  [height / decimation][width / decimation], of which rows first ... last - 1 are written
+WIDE_VECTORS void read_depth(const DepthImage& image, const Config& config, int first, int last, float* depth) {
+  const int step = config.decimation, width = image.width / step;
   const DepthMeaning meaning(config);
-  std::vector<float> depth(static_cast<std::size_t>(width) * height), of_row(step == 1 ? 0 : image.width);
-  for (int t = 0; t < height; ++t) {
-    float* row = &depth[static_cast<std::size_t>(t) * width];
+  std::vector<float> of_row(step == 1 ? 0 : image.width);
+  for (int t = first; t < last; ++t) {
+    float* row = depth + static_cast<std::ptrdiff_t>(t) * width;
     float* to = step == 1 ? row : of_row.data();
     if (image.encoding == DepthImage::Encoding::kStepsU16)
       read_row<std::uint16_t>(image, t * step, config.depth_unit, meaning, to);
@@ -77,7 +78,6 @@ std::vector<float> read_depth(const DepthImage& image, const Config& config) {
     if (step == 1) continue;
     for (int s = 0; s < width; ++s) row[s] = of_row[static_cast<std::size_t>(s) * step];
   }
-  return depth;
 }
 
 using Rgb = std::array<std::uint32_t, 3>;
@@ -178,22 +178,27 @@ class MeanColors {
 };
 
 /// The paper's: one pixel of each block.
-void sample_nearest(const DepthFrame& frame, const Config& config, WorkingImage& image) {
-  image.depth = read_depth(frame.depth, config);
-  if (!frame.color) return;
-  image.color.reserve(image.depth.size());
-  for (int t = 0; t < image.intrinsics.height; ++t)
-    for (int s = 0; s < image.intrinsics.width; ++s)
-      image.color.push_back(packed(read_color(*frame.color, config.decimation * s, config.decimation * t)));
+void sample_nearest(const DepthFrame& frame, const Config& config, RowWorkers& workers, WorkingImage& image) {
+  const int width = image.intrinsics.width, height = image.intrinsics.height;
+  image.depth.resize(static_cast<std::size_t>(width) * height);
+  if (frame.color) image.color.resize(image.depth.size());
+  workers.run(height, image.depth.size(), [&](int first, int last) {
+    read_depth(frame.depth, config, first, last, image.depth.data());
+    if (!frame.color) return;
+    for (int t = first; t < last; ++t)
+      for (int s = 0; s < width; ++s)
+        image.color[static_cast<std::size_t>(t) * width + s] =
+            packed(read_color(*frame.color, config.decimation * s, config.decimation * t));
+  });
 }
 
-void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& image) {
+void sample_means(const DepthFrame& frame, const Config& config, RowWorkers& workers, WorkingImage& image) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
   const Sampling sampling(config);
   SampledDepth sampled(static_cast<std::size_t>(width) * height);
   if (frame.color) image.color.resize(sampled.means.size());
   const std::size_t pixels = static_cast<std::size_t>(frame.depth.width) * frame.depth.height;
-  in_row_bands(height, frame.color ? 2 * pixels : pixels, config.threads, [&](int first, int last) {
+  workers.run(height, frame.color ? 2 * pixels : pixels, [&](int first, int last) {
     BandSampler band(sampling, frame.depth, width);
     std::optional<MeanColors> colors;
     if (frame.color) colors.emplace(*frame.color, band.rows(), sampling, config);
@@ -208,7 +213,7 @@ void sample_means(const DepthFrame& frame, const Config& config, WorkingImage& i
 }  // namespace
 
 /// 32 bits hold the number, and are as wide as the depths: so the compiler makes vectors of the loop.
-std::size_t WorkingImage::measured_pixels() const {
+WIDE_VECTORS std::size_t WorkingImage::measured_pixels() const {
   std::uint32_t count = 0;
   for (const float d : depth) count += d != 0 ? 1 : 0;
   return count;
@@ -218,7 +223,7 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }
 
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels) {
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, RowWorkers& workers) {
   check_depth(frame.depth, config);
   check_intrinsics(frame.intrinsics, frame.depth);
   check_grid_size(frame.intrinsics, config, max_voxels);
@@ -228,9 +233,9 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config, d
   WorkingImage image;
   image.intrinsics = decimated(frame.intrinsics, config.decimation);
   if (config.sampling == "mean" && config.decimation > 1)
-    sample_means(frame, config, image);
+    sample_means(frame, config, workers, image);
   else
-    sample_nearest(frame, config, image);
+    sample_nearest(frame, config, workers, image);
   return image;
 }
 

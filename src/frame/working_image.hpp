@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "frame/row_workers.hpp"
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
@@ -25,7 +26,7 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b);
 /// the decimation.
 /// @param max_voxels  see check_grid_size()
 /// @throws BadFrame  a sentence that names what is wrong with the frame
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels);
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, RowWorkers& workers);
 
 /// The working image of a saved view.
 WorkingImage working_image_of(const SavedView& view);

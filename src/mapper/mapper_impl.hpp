@@ -12,6 +12,7 @@
 #include "frame/limits.hpp"
 #include "frame/pose_correction.hpp"
 #include "frame/recent_views.hpp"
+#include "frame/row_workers.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "map/change_readers.hpp"
 #include "map/seen_points.hpp"
@@ -59,6 +60,7 @@ struct Mapper::Impl {
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
         limits(make_limits(config)),
+        workers(config.threads),
         commands(choose_device(config)),
         lists(commands),
         map(commands, lists, config),
@@ -99,6 +101,7 @@ struct Mapper::Impl {
   std::uint64_t stage_times_every() const;
   Frame begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number);
   double seen_spacing(const Camera& camera) const;
+  void prepare_end(const WorkingImage& image, const Report& report);
   bool find_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
   void carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
@@ -117,6 +120,7 @@ struct Mapper::Impl {
 
   const Config config;
   const Limits limits;
+  RowWorkers workers;
   Commands commands;
   Lists lists;
   SurfelMap map;
@@ -149,6 +153,7 @@ struct Mapper::Impl {
   std::unique_ptr<MapArchive> archive;  ///< with a map_folder
   std::vector<std::string> warnings;    ///< that have not been taken
   ChangeReaders readers;
+  std::vector<BlockKey> blocks_in_view;  ///< of this frame
   std::uint64_t sequence = 0;
 };
 

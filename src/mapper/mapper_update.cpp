@@ -51,7 +51,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   commands.time_stages(report.sequence % stage_times_every() == 0);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels()));
+  const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels(), workers));
   const WorkingImage& image = *shared_image;
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
@@ -59,9 +59,11 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   begin_call();
   remember_forgotten();
 
-  // Observed space C~ - 3.3, eq. (9)-(11). It needs no pose: the device finds it while the host corrects the pose
+  // Observed space C~ - 3.3, eq. (9)-(11) -, and candidates for creation - 3.5, eq. (13) -: unobserved voxels beside observed ones. They
+  // need no pose: the device finds them while the host corrects the pose
   camera.set_image(shared_image);
   observed.compute(camera);
+  candidates.find(camera.grid(), observed.bits());
   commands.start();
 
   // Pose correction - ours: the jitter of the recorded poses is taken out
@@ -122,10 +124,8 @@ bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame
   else
     report.taken_back = taking_back.give_back(camera, map.window(), image, views, &frame);
 
-  for (;;) {
-    // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
-    // surviving surfel needs no new one
-    candidates.find(camera.grid(), observed.bits());
+  for (;; candidates.find(camera.grid(), observed.bits())) {
+    // Removal and labels of the surfels in view - 3.4, eq. (12). A voxel with a surviving surfel is no candidate: it needs no new one
     visit.visit(frame, camera, observed.bits(), observed.column_end(), views, taking_back.taken(), map, candidates);
 
     // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
@@ -150,6 +150,8 @@ bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame
     const bool is_ahead = map.go_ahead("creation", {is_judged ? nullptr : taking_back.wanting(), list.voxels().length(),
                                                     creation.chosen().length(), candidates.visit_counts()()});
     if (is_ahead) carry_out(frame, camera, std::nullopt);
+    commands.start();
+    prepare_end(image, report);
     const SurfelVisit::Found found = SurfelVisit::read_found(candidates, map);  // the host waits
     if (is_ahead && !found.goes_on) map.stayed();
 
@@ -183,6 +185,12 @@ bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame
   }
 }
 
+/// What the end of the frame needs, and the host can find while the device works.
+void Mapper::Impl::prepare_end(const WorkingImage& image, const Report& report) {
+  pose_correction.prepare(image);
+  blocks_in_view = blocks_of_view(image.intrinsics, report.T_world_camera, config.z_max, map.block_size()).blocks;
+}
+
 /// Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16) -, labels and colour - 3.5.
 /// @param removed  number of surfels that leave the map; none if the host does not know it yet
 void Mapper::Impl::carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed) {
@@ -208,7 +216,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
   pose_correction.add(image, pose);
   report.view_kept = views.keep_current();
   sequence = report.sequence;
-  looked_at.note(blocks_of_view(image.intrinsics, pose.T_world_camera, config.z_max, map.block_size()).blocks, sequence);
+  looked_at.note(blocks_in_view, sequence);
   taken_from.note(taking_back.take_changed(), sequence);
   lost_page.note(shrunk, sequence);
   if (archive) {
