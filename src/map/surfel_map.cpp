@@ -96,32 +96,25 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   begin_undo();
   choose_spare_pages();
   largest_radius_ = largest;
-  listed_cells_.clear();
+  listed_.clear();
   for (int cell = 0; cell < window_.cells(); ++cell) {
     const BlockKey block = window_.block(cell);
-    listed_cells_.push_back(index_.find(block) != nullptr && window_.meets_grid(block));
+    const BlockIndex::Pages* pages = index_.find(block);
+    listed_.push_back(pages != nullptr && window_.meets_grid(block) ? pages : nullptr);
   }
   list_window();
 }
 
-/// Too little memory for pages that the frame may not need is no fault: it gets those that there are.
+/// With too little memory for them, the frame gets those that there are.
 void SurfelMap::choose_spare_pages() {
   if (commands_.shape().is_near) return;
   spare_pages_ = index_.next_pages(std::max(next_spares_, kLeastSpares));
-  const auto keep_those_there = [&] {
-    std::size_t room = std::min({surfels_.size() / PAGE_SLOTS, alive_.size(), changed_.size(), page_block_.size()});
-    if (reserves_ids_) room = std::min(room, reserved_.size());
-    const auto beyond = std::find_if(spare_pages_.begin(), spare_pages_.end(), [&](Page page) { return page >= room; });
-    spare_pages_.erase(beyond, spare_pages_.end());
-    next_spares_ = 0;
-  };
-  try {
-    grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end()));
-  } catch (const Error&) {
-    keep_those_there();
-  } catch (const AllocationError&) {
-    keep_those_there();
-  }
+  if (can_do([&] { grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end())); })) return;
+  std::size_t room = std::min({surfels_.size() / PAGE_SLOTS, alive_.size(), changed_.size(), page_block_.size()});
+  if (reserves_ids_) room = std::min(room, reserved_.size());
+  const auto beyond = std::find_if(spare_pages_.begin(), spare_pages_.end(), [&](Page page) { return page >= room; });
+  spare_pages_.erase(beyond, spare_pages_.end());
+  next_spares_ = 0;
 }
 
 /// Lists the window's pages, sorted by cell.
@@ -129,9 +122,8 @@ void SurfelMap::list_window() {
   close_window();
   std::vector<cl_uint> cell_pages = {0};
   for (int cell = 0; cell < window_.cells(); ++cell) {
-    if (listed_cells_[cell]) {
-      const BlockIndex::Pages& own = *index_.find(window_.block(cell));
-      window_pages_.insert(window_pages_.end(), own.begin(), own.end());
+    if (const BlockIndex::Pages* own = listed_[static_cast<std::size_t>(cell)]; own != nullptr) {
+      window_pages_.insert(window_pages_.end(), own->begin(), own->end());
       page_cells_.resize(window_pages_.size(), static_cast<cl_uint>(cell));
     }
     cell_pages.push_back(static_cast<cl_uint>(window_pages_.size()));

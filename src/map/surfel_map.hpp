@@ -56,7 +56,7 @@ class SurfelMap {
 
   /// Keeps what the frame may overwrite, so that roll_back() can undo the frame: surfels that are marked as changed, and those in `freed`.
   /// @param freed  surfels that are going to leave the map, a word for each page that the window had when it was opened
-  /// @param count  number of surfels in `freed`; after go_ahead() it does not matter
+  /// @param count  number of surfels in `freed`; 0 after go_ahead(), which has made room
   void back_up(const char* stage, const DeviceArray<cl_ulong>& freed, std::size_t count);
 
   /// Makes room for `additional` more surfels in this window.
@@ -205,6 +205,7 @@ class SurfelMap {
   const cl::Buffer& reserved() const { return reserves_ids_ ? reserved_() : alive_(); }   ///< no new surfel may take these slots
   std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
   void make_room_to_keep(std::size_t surfels);
+  bool can_do(const std::function<void()>& allocate) const;
   void sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   void sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;
@@ -228,8 +229,9 @@ class SurfelMap {
   MapWindow window_;
   std::vector<Page> window_pages_;
   std::vector<cl_uint> page_cells_;  ///< cell of each page
-  std::vector<bool> listed_cells_;   ///< cells with listed pages: their block meets the grid, or got pages in this frame
-  std::size_t sorted_pages_ = 0;     ///< those before added ones
+  /// Of each cell, its block's pages, if they are listed: the block meets the grid, or got pages in this frame. Else null
+  std::vector<const BlockIndex::Pages*> listed_;
+  std::size_t sorted_pages_ = 0;  ///< those before added ones
   /// The same on the device, where only the sorted ones have cells. cell_pages_list_: index of the first page of each cell, then the number
   /// of pages.
   SentArray<cl_uint> pages_list_, page_cells_list_, cell_pages_list_;

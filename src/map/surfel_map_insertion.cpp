@@ -40,13 +40,7 @@ bool SurfelMap::sort_early(const char* stage, const NewCells& cells, const Devic
 
 bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
   if (spare_pages_.empty() || missing_told_ == nullptr || undo_.kept_pages > 0) return false;
-  try {
-    make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept));
-  } catch (const Error&) {
-    return false;
-  } catch (const AllocationError&) {
-    return false;
-  }
+  if (!can_do([&] { make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept)); })) return false;
   const auto room = static_cast<cl_uint>(undo_.room - undo_.most_kept), spare = static_cast<cl_uint>(spare_pages_.size());
   const cl::Buffer& evidence = doubts.evidence != nullptr ? *doubts.evidence : doubts.listed;  // a kernel takes no missing buffer
   commands_.run(stage, "decide_to_go_on", 1, 1, evidence, static_cast<cl_int>(doubts.evidence != nullptr), doubts.listed, doubts.chosen,
@@ -54,6 +48,18 @@ bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
   ahead_counts_ = doubts.counts;
   is_ahead_ = undo_.ahead = true;
   undo_.spares_from = window_pages();
+  return true;
+}
+
+/// Too little memory for what a frame may not need is no fault.
+bool SurfelMap::can_do(const std::function<void()>& allocate) const {
+  try {
+    allocate();
+  } catch (const Error&) {
+    return false;
+  } catch (const AllocationError&) {
+    return false;
+  }
   return true;
 }
 
@@ -93,12 +99,15 @@ void SurfelMap::insert_ahead(const char* stage, const DeviceArray<cl_uint4>& sur
 void SurfelMap::add_missing_pages() {
   const std::vector<cl_uint>& before = *missing_told_;
   next_spares_ = 2 * before.back();
-  for (std::size_t cell = 0; cell + 1 < before.size(); ++cell)
+  for (std::size_t cell = 0; cell + 1 < before.size(); ++cell) {
+    if (before[cell] == before[cell + 1]) continue;
+    const BlockKey block = window_.block(static_cast<int>(cell));
     for (cl_uint n = before[cell]; n < before[cell + 1]; ++n) {
-      window_pages_.push_back(add_page(window_.block(static_cast<int>(cell))));
+      window_pages_.push_back(add_page(block));
       page_cells_.push_back(static_cast<cl_uint>(cell));
-      listed_cells_[cell] = true;
     }
+    listed_[cell] = index_.find(block);
+  }
 }
 
 void SurfelMap::sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {

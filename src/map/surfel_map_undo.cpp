@@ -38,10 +38,8 @@ void SurfelMap::back_up(const char* stage, const DeviceArray<cl_ulong>& freed, s
   kept_frames_.resize(count);
   kept_alive_.resize(count);
   kept_slots_.resize(count);
-  if (!is_ahead_) {
-    undo_.most_kept += freed_count;
-    make_room_to_keep(undo_.most_kept);
-  }
+  undo_.most_kept += freed_count;
+  make_room_to_keep(undo_.most_kept);
   if (first) {
     kept_count_.resize(1);
     kept_count_.fill(stage, 0, 1);

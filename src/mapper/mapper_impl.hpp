@@ -103,7 +103,7 @@ struct Mapper::Impl {
   double seen_spacing(const Camera& camera) const;
   void prepare_end(const WorkingImage& image, const Report& report);
   bool find_changes(const WorkingImage& image, Camera& camera, Frame& frame, Report& report);
-  void carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed);
+  void carry_out(const Frame& frame, const Camera& camera, std::size_t removed);
   void fetch_blocks(const Camera& camera, const Eigen::Isometry3d& T_world_camera, std::uint32_t number);
   void finish_frame(std::uint32_t number, const WorkingImage& image, const Camera& camera, const CorrectedPose& pose, Report& report);
   Changes changes(std::uint64_t since);

@@ -149,7 +149,7 @@ bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame
     creation.chosen().read_length_later();
     const bool is_ahead = map.go_ahead("creation", {is_judged ? nullptr : taking_back.wanting(), list.voxels().length(),
                                                     creation.chosen().length(), candidates.visit_counts()()});
-    if (is_ahead) carry_out(frame, camera, std::nullopt);
+    if (is_ahead) carry_out(frame, camera, 0);
     commands.start();
     prepare_end(image, report);
     const SurfelVisit::Found found = SurfelVisit::read_found(candidates, map);  // the host waits
@@ -192,8 +192,8 @@ void Mapper::Impl::prepare_end(const WorkingImage& image, const Report& report) 
 }
 
 /// Psi_(n+1) = survivors u created - 3.4, eq. (12); 3.5, eq. (14)-(16) -, labels and colour - 3.5.
-/// @param removed  number of surfels that leave the map; none if the host does not know it yet
-void Mapper::Impl::carry_out(const Frame& frame, const Camera& camera, std::optional<std::size_t> removed) {
+/// @param removed  number of surfels that leave the map; 0 if the host does not know it yet
+void Mapper::Impl::carry_out(const Frame& frame, const Camera& camera, std::size_t removed) {
   remove_surfels(commands, visit.removed(), removed, map);
   creation.insert(map);
   label_surfels(commands, frame, camera, observed.column_end(), map);

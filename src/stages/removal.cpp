@@ -2,12 +2,12 @@
 
 namespace frontier_surfels {
 
-void remove_surfels(Commands& commands, const BitField& removed, std::optional<std::size_t> count, SurfelMap& map) {
+void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map) {
   const std::size_t pages = map.window_pages();
-  map.back_up("removal", removed, count.value_or(0));
+  map.back_up("removal", removed, count);
   commands.run("removal", "remove_surfels", pages, kGroup, map.goes_on(), map.pages(), static_cast<cl_uint>(pages), removed(), map.alive(),
                map.changed());
-  map.removed(count.value_or(0));
+  map.removed(count);
 }
 
 void label_surfels(Commands& commands, const Frame& frame, const Camera& camera, const DeviceArray<cl_int>& column_end, SurfelMap& map) {

@@ -2,16 +2,14 @@
 /// kernels/stages/16_removal.cl and 18_labels.cl.
 #pragma once
 
-#include <optional>
-
 #include "map/surfel_map.hpp"
 #include "stages/frame.hpp"
 
 namespace frontier_surfels {
 
 /// Frees the slots of removed surfels, after a backup of all that the rest of the frame may overwrite.
-/// @param removed  SurfelVisit::removed(); @param count  surfels in it; none after SurfelMap::go_ahead()
-void remove_surfels(Commands& commands, const BitField& removed, std::optional<std::size_t> count, SurfelMap& map);
+/// @param removed  SurfelVisit::removed(); @param count  surfels in it; 0 after SurfelMap::go_ahead(), as went_on() is told
+void remove_surfels(Commands& commands, const BitField& removed, std::size_t count, SurfelMap& map);
 
 /// Labels and colours surfels at measured surfaces. It looks at the surfels that are marked as changed: new ones, and those that
 /// SurfelVisit has marked.

@@ -214,7 +214,7 @@ class Pages {
     const bool is_ahead = map().go_ahead("test", {found.asks ? &evidence() : nullptr, listed(), chosen(), counts()});
     EXPECT_NE(is_ahead, commands.shape().is_near);
     if (!is_ahead) return false;
-    remove_surfels(commands, leaving, std::nullopt, map());
+    remove_surfels(commands, leaving, 0, map());
     map().insert_ahead("test", new_surfels);
     commands.wait();
     const bool goes_on = counts.read_one(COUNT_GOES_ON) != 0;
