@@ -34,8 +34,9 @@ class RandomJitter {
 };
 
 WorkingImage working(const replay::RecordedFrame& frame) {
-  RowWorkers workers(1);
-  return make_working_image(frame.view(), undecimated(), kVoxels, workers);
+  const Config config = undecimated();
+  SamplingRoom room(config);
+  return make_working_image(frame.view(), config, kVoxels, room);
 }
 
 /// A frame as a reference for others.

@@ -46,8 +46,8 @@ struct Image {
     return frame;
   }
   WorkingImage working(const Config& config) const {
-    RowWorkers workers(config.threads);
-    return make_working_image(frame(), config, kVoxels, workers);
+    SamplingRoom room(config);
+    return make_working_image(frame(), config, kVoxels, room);
   }
 };
 
@@ -135,8 +135,8 @@ TEST(Sampling, HowDepthsAreWrittenMakesNoDifference) {
         frame.depth.swap_bytes = swap;
         frame.depth.data = &all.bytes[1];
         SCOPED_TRACE("image " + std::to_string(n) + (swap ? ", swapped" : "") + (in_steps ? ", in steps" : ", in metres"));
-        RowWorkers workers(config.threads);
-        expect_equal(make_working_image(frame, config, kVoxels, workers), expected);
+        SamplingRoom room(config);
+        expect_equal(make_working_image(frame, config, kVoxels, room), expected);
       }
   }
 }

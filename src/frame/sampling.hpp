@@ -70,7 +70,11 @@ class DepthRows {
 
 /// What the blocks of an image have measured.
 struct SampledDepth {
-  explicit SampledDepth(std::size_t blocks) : means(blocks), pivots(blocks), whole(blocks) {}
+  void resize(std::size_t blocks) {
+    means.resize(blocks);
+    pivots.resize(blocks);
+    whole.resize(blocks);
+  }
 
   std::vector<float> means;   ///< [height / decimation][width / decimation] [m]; 0: none, +Inf: no return
   std::vector<float> pivots;  ///< likewise: the pixels that agree with this depth were used; 0: none

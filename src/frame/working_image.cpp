@@ -192,13 +192,14 @@ void sample_nearest(const DepthFrame& frame, const Config& config, RowWorkers& w
   });
 }
 
-void sample_means(const DepthFrame& frame, const Config& config, RowWorkers& workers, WorkingImage& image) {
+void sample_means(const DepthFrame& frame, const Config& config, SamplingRoom& room, WorkingImage& image) {
   const int width = image.intrinsics.width, height = image.intrinsics.height;
   const Sampling sampling(config);
-  SampledDepth sampled(static_cast<std::size_t>(width) * height);
+  SampledDepth& sampled = room.sampled;
+  sampled.resize(static_cast<std::size_t>(width) * height);
   if (frame.color) image.color.resize(sampled.means.size());
   const std::size_t pixels = static_cast<std::size_t>(frame.depth.width) * frame.depth.height;
-  workers.run(height, frame.color ? 2 * pixels : pixels, [&](int first, int last) {
+  room.workers.run(height, frame.color ? 2 * pixels : pixels, [&](int first, int last) {
     BandSampler band(sampling, frame.depth, width);
     std::optional<MeanColors> colors;
     if (frame.color) colors.emplace(*frame.color, band.rows(), sampling, config);
@@ -223,7 +224,7 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.width == b.width && a.height == b.height;
 }
 
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, RowWorkers& workers) {
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, SamplingRoom& room) {
   check_depth(frame.depth, config);
   check_intrinsics(frame.intrinsics, frame.depth);
   check_grid_size(frame.intrinsics, config, max_voxels);
@@ -233,9 +234,9 @@ WorkingImage make_working_image(const DepthFrame& frame, const Config& config, d
   WorkingImage image;
   image.intrinsics = decimated(frame.intrinsics, config.decimation);
   if (config.sampling == "mean" && config.decimation > 1)
-    sample_means(frame, config, workers, image);
+    sample_means(frame, config, room, image);
   else
-    sample_nearest(frame, config, workers, image);
+    sample_nearest(frame, config, room.workers, image);
   return image;
 }
 

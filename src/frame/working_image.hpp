@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "frame/row_workers.hpp"
+#include "frame/sampling.hpp"
 #include "frontier_surfels/config.hpp"
 #include "frontier_surfels/types.hpp"
 
@@ -19,6 +20,14 @@ struct WorkingImage {
   std::size_t measured_pixels() const;  ///< see Report
 };
 
+/// What successive images are made with: threads, and memory, because new memory costs more than what is written to it.
+struct SamplingRoom {
+  explicit SamplingRoom(const Config& config) : workers(config.threads) {}
+
+  RowWorkers workers;
+  SampledDepth sampled;  ///< of the last image
+};
+
 /// Are these the intrinsics of the same camera?
 bool same_camera(const Intrinsics& a, const Intrinsics& b);
 
@@ -26,7 +35,7 @@ bool same_camera(const Intrinsics& a, const Intrinsics& b);
 /// the decimation.
 /// @param max_voxels  see check_grid_size()
 /// @throws BadFrame  a sentence that names what is wrong with the frame
-WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, RowWorkers& workers);
+WorkingImage make_working_image(const DepthFrame& frame, const Config& config, double max_voxels, SamplingRoom& room);
 
 /// The working image of a saved view.
 WorkingImage working_image_of(const SavedView& view);

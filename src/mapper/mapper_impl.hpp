@@ -12,7 +12,7 @@
 #include "frame/limits.hpp"
 #include "frame/pose_correction.hpp"
 #include "frame/recent_views.hpp"
-#include "frame/row_workers.hpp"
+#include "frame/working_image.hpp"
 #include "frontier_surfels/mapper.hpp"
 #include "map/change_readers.hpp"
 #include "map/seen_points.hpp"
@@ -60,7 +60,7 @@ struct Mapper::Impl {
   explicit Impl(const Config& wanted)
       : config(checked(wanted)),
         limits(make_limits(config)),
-        workers(config.threads),
+        sampling_room(config),
         commands(choose_device(config)),
         lists(commands),
         map(commands, lists, config),
@@ -120,7 +120,7 @@ struct Mapper::Impl {
 
   const Config config;
   const Limits limits;
-  RowWorkers workers;
+  SamplingRoom sampling_room;
   Commands commands;
   Lists lists;
   SurfelMap map;

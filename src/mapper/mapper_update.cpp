@@ -51,7 +51,7 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   commands.time_stages(report.sequence % stage_times_every() == 0);
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
-  const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels(), workers));
+  const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels(), sampling_room));
   const WorkingImage& image = *shared_image;
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
