@@ -56,8 +56,8 @@ TEST(RowWorkers, AnExceptionReachesTheCallerAndTheNextWorkIsDone) {
   }
 }
 
-/// Threads that have never had work end, too.
-TEST(RowWorkers, EndWithoutWork) {
+/// Also when their threads have only just begun.
+TEST(RowWorkers, EndAtOnce) {
   for (int repeat = 0; repeat < 100; ++repeat) {
     RowWorkers workers(0);
     if (repeat % 2 == 0) visits(workers, 100, kMany);

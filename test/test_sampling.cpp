@@ -144,8 +144,9 @@ TEST(Sampling, HowDepthsAreWrittenMakesNoDifference) {
 /// The image is large enough for several bands of rows.
 TEST(Sampling, ThreadsMakeNoDifference) {
   std::mt19937 rng(9);
-  for (const int decimation : {2, 3, 4, 5}) {
-    Config config = config_for(decimation);
+  for (int n = 0; n < 10; ++n) {
+    Config config = config_for(1 + n / 2);
+    config.sampling = n % 2 == 0 ? "mean" : "nearest";
     Image image = random_image(801, 603, rng);
     for (std::size_t byte = 0; byte < 3 * image.depth.size(); ++byte) image.color.push_back(static_cast<std::uint8_t>(rng()));
     config.threads = 1;
@@ -154,6 +155,17 @@ TEST(Sampling, ThreadsMakeNoDifference) {
       config.threads = threads;
       expect_equal(image.working(config), expected);
     }
+  }
+}
+
+TEST(Sampling, MemoryOfEarlierImagesMakesNoDifference) {
+  std::mt19937 rng(10);
+  const Config config = config_for(4);
+  SamplingRoom room(config);
+  for (int n = 0; n < 40; ++n) {
+    const int height = 4 + static_cast<int>(rng() % 60), width = 4 + static_cast<int>(rng() % 60);
+    const Image image = random_image(width, height, rng);
+    expect_equal(make_working_image(image.frame(), config, kVoxels, room), image.working(config));
   }
 }
 

@@ -74,6 +74,7 @@ void PoseCorrection::prepare(const WorkingImage& image) {
 
 void PoseCorrection::add(const WorkingImage& image, const CorrectedPose& pose) {
   if (!config_.correct_poses) return;
+  if (prepared_.size() != image.depth.size()) prepare(image);  // of another camera: its image must not be taken for this one's
   History& history = histories_.use(image.intrinsics, image.intrinsics);
   std::vector<float> unused;
   if (history.last.size() == kFrames) {

@@ -9,7 +9,7 @@
 namespace frontier_surfels {
 namespace {
 
-constexpr std::size_t kLeastValues = 20000;  // of a band: they take some tens of microseconds, about what waking a thread takes
+constexpr std::size_t kLeastValues = 20000;  // of a band: they take some tens of microseconds, as it may take a thread to wake
 constexpr int kMostThreads = 8;
 constexpr int kBandsOfThread = 2;  // a thread that wakes late leaves its second one to others
 

@@ -11,7 +11,7 @@
 
 namespace frontier_surfels {
 
-/// Threads that wait for rows: to wake one takes some microseconds, to start one 25 to 50.
+/// Threads that wait for rows: to wake one costs the calling thread some microseconds, to start one 25 to 50.
 class RowWorkers {
  public:
   using Work = std::function<void(int first, int last)>;
@@ -23,7 +23,8 @@ class RowWorkers {
   RowWorkers& operator=(const RowWorkers&) = delete;
 
   /// Calls work(first, last) for bands of rows, first ... last - 1, that make up all rows, on several threads, the calling one among them.
-  /// All have ended when it returns. An exception of any of them is thrown again here. Not to be called by two threads at once.
+  /// All have ended when it returns. An exception of any of them is thrown again here. Not to be called by two threads at
+  /// once, nor by the work.
   /// @param values  numbers that are read for all rows together
   void run(int rows, std::size_t values, const Work& work);
 

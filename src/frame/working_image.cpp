@@ -182,7 +182,7 @@ void sample_nearest(const DepthFrame& frame, const Config& config, RowWorkers& w
   const int width = image.intrinsics.width, height = image.intrinsics.height;
   image.depth.resize(static_cast<std::size_t>(width) * height);
   if (frame.color) image.color.resize(image.depth.size());
-  workers.run(height, image.depth.size(), [&](int first, int last) {
+  workers.run(height, static_cast<std::size_t>(frame.depth.width) * height, [&](int first, int last) {
     read_depth(frame.depth, config, first, last, image.depth.data());
     if (!frame.color) return;
     for (int t = first; t < last; ++t)

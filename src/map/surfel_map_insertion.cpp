@@ -52,7 +52,7 @@ bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
 }
 
 /// Too little memory for what a frame may not need is no fault.
-bool SurfelMap::can_do(const std::function<void()>& allocate) const {
+bool SurfelMap::can_do(const std::function<void()>& allocate) {
   try {
     allocate();
   } catch (const Error&) {

@@ -59,11 +59,9 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   begin_call();
   remember_forgotten();
 
-  // Observed space C~ - 3.3, eq. (9)-(11) -, and candidates for creation - 3.5, eq. (13) -: unobserved voxels beside observed ones. They
-  // need no pose: the device finds them while the host corrects the pose
+  // Observed space C~ - 3.3, eq. (9)-(11). It needs no pose: the device finds it while the host corrects the pose
   camera.set_image(shared_image);
   observed.compute(camera);
-  candidates.find(camera.grid(), observed.bits());
   commands.start();
 
   // Pose correction - ours: the jitter of the recorded poses is taken out
@@ -124,8 +122,10 @@ bool Mapper::Impl::find_changes(const WorkingImage& image, Camera& camera, Frame
   else
     report.taken_back = taking_back.give_back(camera, map.window(), image, views, &frame);
 
-  for (;; candidates.find(camera.grid(), observed.bits())) {
-    // Removal and labels of the surfels in view - 3.4, eq. (12). A voxel with a surviving surfel is no candidate: it needs no new one
+  for (;;) {
+    // Candidates for creation - 3.5, eq. (13): unobserved voxels beside observed ones. They come before removal, because a voxel with a
+    // surviving surfel needs no new one
+    candidates.find(camera.grid(), observed.bits());
     visit.visit(frame, camera, observed.bits(), observed.column_end(), views, taking_back.taken(), map, candidates);
 
     // Candidates that a kept view has seen are settled, and so are candidates on thin sheets of unknown space - both ours
