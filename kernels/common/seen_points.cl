@@ -40,21 +40,19 @@ INLINE intv bricks_at(const SeenPoints* seen, int shift, const SeenPlace* x, con
   return inside ? brick : SEEN_BRICK_EMPTY;
 }
 
-// Which of LANES points lie in space that was seen before: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE
-// are seen.
-//   p: camera frame [m];  asked: marks of the points in question
-intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
-  const int shift = f->seen_shift;
-  const float scale = divided((float)(SEEN_BRICK << shift), f->window.block_size);
-  const Points q = transformed(&f->T_local_camera, p);
-  const floatv x = q.x * scale - 0.5f, y = q.y * scale - 0.5f, z = q.z * scale - 0.5f;
+// Which of LANES points on the lattice are seen: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE are. It is
+// not inlined, and takes numbers: where a pointer to a structure is passed to a function, each work item of a kernel makes a copy of the
+// structure before it does anything else.
+//   q: in points, from the window's first one;  blocks_x, blocks_y, blocks_z: of the window;  asked: marks of the points in question
+intv seen_around(const SeenPoints seen, Points q, int shift, int blocks_x, int blocks_y, int blocks_z, intv asked) {
+  const floatv x = q.x, y = q.y, z = q.z;
   const intv i = floor_int(x), j = floor_int(y), k = floor_int(z);
-  const int row = f->window.size_x, layer = row * f->window.size_y;
+  const int row = blocks_x, layer = row * blocks_y;
   SeenPlace along_x[2], along_y[2], along_z[2];
-  along_x[0] = seen_place(i, shift, f->window.size_x, 1, 0);
-  along_y[0] = seen_place(j, shift, f->window.size_y, row, 1);
-  along_z[0] = seen_place(k, shift, f->window.size_z, layer, 2);
-  const intv first = bricks_at(seen, shift, &along_x[0], &along_y[0], &along_z[0]);
+  along_x[0] = seen_place(i, shift, blocks_x, 1, 0);
+  along_y[0] = seen_place(j, shift, blocks_y, row, 1);
+  along_z[0] = seen_place(k, shift, blocks_z, layer, 2);
+  const intv first = bricks_at(&seen, shift, &along_x[0], &along_y[0], &along_z[0]);
 
   // Most points have all 8 in one brick, and most of these bricks are uniform.
   const int last = SEEN_BRICK - 1;
@@ -63,21 +61,34 @@ intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
   const intv known = alike & MARK(first == SEEN_BRICK_FULL), open = asked & ~alike;
   if (!any_lane(open)) return known;
 
-  along_x[1] = seen_place(i + 1, shift, f->window.size_x, 1, 0);
-  along_y[1] = seen_place(j + 1, shift, f->window.size_y, row, 1);
-  along_z[1] = seen_place(k + 1, shift, f->window.size_z, layer, 2);
+  along_x[1] = seen_place(i + 1, shift, blocks_x, 1, 0);
+  along_y[1] = seen_place(j + 1, shift, blocks_y, row, 1);
+  along_z[1] = seen_place(k + 1, shift, blocks_z, layer, 2);
   const bool one_brick = !any_lane(open & ~together);
   const floatv a = x - convert_floatv(i), b = y - convert_floatv(j), c = z - convert_floatv(k);
   floatv share = 0.0f;
+#if LANES == 1
+#pragma unroll  // arrays whose places are known stay in registers
+#endif
   for (int n = 0; n < 8; ++n) {
     const SeenPlace *u = &along_x[n & 1], *v = &along_y[n >> 1 & 1], *t = &along_z[n >> 2];
     const floatv weight = (n & 1 ? a : 1.0f - a) * (n & 2 ? b : 1.0f - b) * (n & 4 ? c : 1.0f - c);
-    const intv brick = one_brick ? first : bricks_at(seen, shift, u, v, t);
+    const intv brick = one_brick ? first : bricks_at(&seen, shift, u, v, t);
     const intv bit = u->bit + v->bit + t->bit;
-    const intv half_word = gather_int(seen->bricks, 2 * (SEEN_WORDS * brick + u->word + v->word + t->word) + (bit >> 5));
+    const intv half_word = gather_int(seen.bricks, 2 * (SEEN_WORDS * brick + u->word + v->word + t->word) + (bit >> 5));
     share += MARK((half_word >> (bit & 31) & 1) != 0) ? weight : 0.0f;
   }
   return known | (open & MARK(share > SEEN_SHARE));
+}
+
+// Which of LANES points lie in space that was seen before.
+//   p: camera frame [m];  asked: marks of the points in question
+INLINE intv seen_before(const Frame* f, const SeenPoints* seen, Points p, intv asked) {
+  const Window* w = &f->window;
+  const float scale = divided((float)(SEEN_BRICK << f->seen_shift), w->block_size);
+  const Points q = transformed(&f->T_local_camera, p);
+  return seen_around(*seen, (Points){q.x * scale - 0.5f, q.y * scale - 0.5f, q.z * scale - 0.5f}, f->seen_shift, w->size_x, w->size_y,
+                     w->size_z, asked);
 }
 
 // Which of the lattice points around a box are seen: none, some, or all? SEEN_MIXED also where that would take long to find out.
