@@ -40,9 +40,9 @@ INLINE intv bricks_at(const SeenPoints* seen, int shift, const SeenPlace* x, con
   return inside ? brick : SEEN_BRICK_EMPTY;
 }
 
-// Which of LANES points on the lattice are seen: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE are. It is
-// not inlined, and takes numbers: where a pointer to a structure is passed to a function, each work item of a kernel makes a copy of the
-// structure before it does anything else.
+// Which of LANES points on the lattice are seen: of the 8 lattice points around them, weighted trilinearly, more than SEEN_SHARE are. It
+// takes numbers, because many compilers do not inline it: where a pointer to a structure is passed to such a function, each work item of a
+// kernel makes a copy of the structure before it does anything else.
 //   q: in points, from the window's first one;  blocks_x, blocks_y, blocks_z: of the window;  asked: marks of the points in question
 intv seen_around(const SeenPoints seen, Points q, int shift, int blocks_x, int blocks_y, int blocks_z, intv asked) {
   const floatv x = q.x, y = q.y, z = q.z;
