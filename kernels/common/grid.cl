@@ -36,10 +36,10 @@ INLINE Voxels voxels_at(const Grid* g, Points p) {
 }
 
 INLINE intv inside_grid(const Grid* g, Voxels v) {
-  return MARK((v.i >= 0) & (v.j >= 0) & (v.k >= 0) & (v.i < g->size_i) & (v.j < g->size_j) & (v.k < g->size_k));
+  return MARK(v.i >= 0) & MARK(v.j >= 0) & MARK(v.k >= 0) & MARK(v.i < g->size_i) & MARK(v.j < g->size_j) & MARK(v.k < g->size_k);
 }
 
-INLINE intv same_voxels(Voxels a, Voxels b) { return MARK((a.i == b.i) & (a.j == b.j) & (a.k == b.k)); }
+INLINE intv same_voxels(Voxels a, Voxels b) { return MARK(a.i == b.i) & MARK(a.j == b.j) & MARK(a.k == b.k); }
 
 // F^-1 of the centres of voxels in the grid's layers.
 //   layer_depth[size_k]: z of each layer's centre [m]

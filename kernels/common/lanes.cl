@@ -8,7 +8,7 @@
 //
 // A mark says yes or no for each lane: an intv whose lanes are -1 or 0. Marks are joined by & | ~, and `mark ? a : b` chooses lane by lane.
 // Comparisons of vectors give -1 or 0, but comparisons of plain numbers give 1 or 0. A comparison that becomes a mark is therefore written
-// MARK(a < b), and several of them MARK((a < b) & (c < d)). A comparison that is only the condition of ?: needs no MARK.
+// MARK(a < b), one by one: MARK(a < b) & MARK(c < d). A comparison that is only the condition of ?: needs no MARK.
 //
 // A list of n entries is handled in chunks of LANES. The last chunk may be filled partly.
 
@@ -43,7 +43,7 @@
 #define OF_LANES(name) name##16
 #define vloadv(offset, from) vload16(offset, from)
 #define vstorev(values, offset, to) vstore16(values, offset, to)
-#define MARK(condition) (condition)
+#define MARK(condition) separate_marks(condition)
 #define GATHER(values, at)                                                                                                               \
   values[at.s0], values[at.s1], values[at.s2], values[at.s3], values[at.s4], values[at.s5], values[at.s6], values[at.s7], values[at.s8], \
       values[at.s9], values[at.sa], values[at.sb], values[at.sc], values[at.sd], values[at.se], values[at.sf]
@@ -74,7 +74,23 @@ typedef OF_LANES(ulong) ulongv;
 #if LANES == 16
 INLINE intv lane_numbers(void) { return (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
 
+#if defined(ON_CPU) && defined(__clang__) && defined(__AVX2__) && !defined(__AVX512F__)
+// For processors with AVX2 and without AVX-512. LLVM joins comparisons before it makes marks of them. There, it packs 16 comparisons into
+// bytes to do so, and unpacks them again. This hides from it that marks come from comparisons, so that they stay as they are.
+INLINE intv separate_marks(intv marks) {
+  int8 low = marks.lo, high = marks.hi;
+  __asm__("" : "+x"(low), "+x"(high));
+  return (intv)(low, high);
+}
+
 // A number whose bit n says whether lane n is marked.
+INLINE uint lane_bits(intv marks) {
+  const float8 low = as_float8(marks.lo), high = as_float8(marks.hi);
+  return (uint)__builtin_ia32_movmskps256(low) | (uint)__builtin_ia32_movmskps256(high) << 8;
+}
+#else
+INLINE intv separate_marks(intv marks) { return marks; }
+
 INLINE uint lane_bits(intv marks) {
   const int16 bits = marks & ((int16)(1) << lane_numbers());
   const int8 of_8 = bits.lo | bits.hi;
@@ -82,6 +98,7 @@ INLINE uint lane_bits(intv marks) {
   const int2 of_2 = of_4.lo | of_4.hi;
   return (uint)(of_2.x | of_2.y);
 }
+#endif
 
 // Each lane gets the number of the lane before it, and the first one 0.
 INLINE ulongv from_lane_before(ulongv v) { return (ulong16)(0, v.s0123, v.s4567, v.s89ab, v.scd, v.se); }

@@ -23,7 +23,7 @@ typedef struct {
 INLINE SeenPlace seen_place(intv points, int shift, int blocks, int stride, int axis) {
   const int block = shift + SEEN_BRICK_SHIFT;
   SeenPlace place;
-  place.inside = MARK((points >= 0) & (points < blocks << block));
+  place.inside = MARK(points >= 0) & MARK(points < blocks << block);
   const intv n = place.inside ? points : 0;
   place.cell = (n >> block) * stride;
   place.brick = (n >> SEEN_BRICK_SHIFT & ((1 << shift) - 1)) << (axis * shift);
@@ -56,7 +56,7 @@ intv seen_around(const SeenPoints seen, Points q, int shift, int blocks_x, int b
 
   // Most points have all 8 in one brick, and most of these bricks are uniform.
   const int last = SEEN_BRICK - 1;
-  const intv together = MARK(((i & last) != last) & ((j & last) != last) & ((k & last) != last));
+  const intv together = MARK((i & last) != last) & MARK((j & last) != last) & MARK((k & last) != last);
   const intv alike = asked & together & MARK(first <= SEEN_BRICK_FULL);
   const intv known = alike & MARK(first == SEEN_BRICK_FULL), open = asked & ~alike;
   if (!any_lane(open)) return known;

@@ -26,10 +26,11 @@ INLINE floatv view_depths(__global const ushort* depths, intv pixel, float step)
 //   q: column and row times depth, and depth (View);  asked: marks of the points in question
 INLINE intv sees(const View* view, __global const ushort* depths, Points q, intv asked) {
   const floatv scale = divided(1.0f, q.z), s = q.x * scale, t = q.y * scale;
-  const intv seen = asked & MARK((q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)view->width) & (t < (float)view->height));
+  const intv seen =
+      asked & MARK(q.z > 0.0f) & MARK(s >= 0.0f) & MARK(t >= 0.0f) & MARK(s < (float)view->width) & MARK(t < (float)view->height);
   if (!any_lane(seen)) return 0;
   const uintv pixel = view_pixels((uint)view->width, convert_uintv(s), convert_uintv(t));
-  return seen & MARK(q.z < view_depths(depths + view->first_pixel, seen ? as_intv(pixel) : 0, view->depth_step));
+  return seen & MARK(q.z < view_depths(depths + view->first_pixel, seen & as_intv(pixel), view->depth_step));
 }
 
 // Exact membership of points in the space that one view has seen, of those that are asked.
@@ -147,7 +148,7 @@ uint part_of_box(__global const float* group, int part, __global const View* vie
   const BoxInViews b = box_in_views(&v, box);
   const floatv slack_x = 0.01f + 1e-5f * (fabs(v.cx) + v.width), slack_y = 0.01f + 1e-5f * (fabs(v.cy) + v.height);  // [pixel]
   const floatv near = b.center.z - b.half_size.z, far = b.center.z + b.half_size.z;
-  const intv visible = MARK((v.width > 0.0f) & (far > 0.0f)) &
+  const intv visible = MARK(v.width > 0.0f) & MARK(far > 0.0f) &
                        reaches_side(v.fx * b.center.x, v.fx * b.half_size.x, b.center.z, b.half_size.z, v.cx + slack_x) &
                        reaches_side(-v.fx * b.center.x, v.fx * b.half_size.x, b.center.z, b.half_size.z, v.width - v.cx + slack_x) &
                        reaches_side(v.fy * b.center.y, v.fy * b.half_size.y, b.center.z, b.half_size.z, v.cy + slack_y) &

@@ -110,8 +110,8 @@ __kernel void mark_state_cells(const Window window, const float4 place, const in
              y1 = min(floor_int((s.position.y + place.y + ry) * scale), cells.y - 1),
              z1 = min(floor_int((s.position.z + place.z + rz) * scale), cells.z - 1);
   const intv kind = -MARK((s.attributes & SURFEL_OCCUPIED) != 0);
-  const intv within = lane_marks(lanes) & MARK((x0 <= x1) & (y0 <= y1) & (z0 <= z1));
-  const intv small = within & MARK(((x0 >> 5) == (x1 >> 5)) & (y1 <= y0 + 1) & (z1 <= z0 + 1));
+  const intv within = lane_marks(lanes) & MARK(x0 <= x1) & MARK(y0 <= y1) & MARK(z0 <= z1);
+  const intv small = within & MARK((x0 >> 5) == (x1 >> 5)) & MARK(y1 <= y0 + 1) & MARK(z1 <= z0 + 1);
   const uintv bits = ((uintv)(2) << as_uintv(x1 & 31)) - ((uintv)(1) << as_uintv(x0 & 31));
   __global const int* words = (__global const int*)marks;
   const intv all = gather_int(words, small ? mark_word(cells, kind, x0, y0, z0) : 0) &

@@ -64,10 +64,10 @@ INLINE void draw_disc(const AskedCamera* camera, const ViewDisc* disc, __global 
       const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
       const floatv slope = disc->n_x * d_x + disc->n_y * d_y + disc->n_z, hit = divided(disc->from_plane, slope);
       const floatv x = hit * d_x - disc->x, y = hit * d_y - disc->y, z = hit - disc->z;
-      const intv middle = MARK((u == disc->middle_u) & (v == disc->middle_v));
+      const intv middle = MARK(u == disc->middle_u) & MARK(v == disc->middle_v);
       const floatv depth = depths_within(hit, (floatv)(disc->z_low), (floatv)(disc->z_high));
-      const intv drawn = (middle | MARK(x * x + y * y + z * z <= disc->radius2)) & MARK((u <= disc->high_u) & (v <= disc->high_v)) &
-                         MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
+      const intv drawn = (middle | MARK(x * x + y * y + z * z <= disc->radius2)) & MARK(u <= disc->high_u) & MARK(v <= disc->high_v) &
+                         MARK(depth >= VIEW_NEAR) & MARK(depth <= camera->range);
       if (!any_lane(drawn)) continue;
       const uintv keys = drawn ? depth_keys(depth) + disc->kind + slope_keys(camera, slope) : (uintv)(VIEW_NOTHING);
       put_square(keys, old, square, camera->row, shared);
@@ -94,13 +94,13 @@ INLINE void draw_pixel_of_each(const AskedCamera* camera, const ViewDiscs* d, in
   const floatv d_x = (convert_floatv(u) - camera->cx) * camera->inverse_fx, d_y = (convert_floatv(v) - camera->cy) * camera->inverse_fy;
   const floatv slope = d->n.x * d_x + d->n.y * d_y + d->n.z, hit = divided(d->from_plane, slope);
   const floatv x = hit * d_x - d->p.x, y = hit * d_y - d->p.y, z = hit - d->p.z;
-  const intv middle = MARK((u == d->middle_u) & (v == d->middle_v));
+  const intv middle = MARK(u == d->middle_u) & MARK(v == d->middle_v);
   const floatv depth = depths_within(hit, d->z_low, d->z_high);
   uint key[LANES];
   int at[LANES];
   vstorev(depth_keys(depth) + d->kind + slope_keys(camera, slope), 0, key);
   vstorev(v * camera->row + u, 0, at);
-  marks &= (middle | MARK(x * x + y * y + z * z <= d->radius2)) & MARK((depth >= VIEW_NEAR) & (depth <= camera->range));
+  marks &= (middle | MARK(x * x + y * y + z * z <= d->radius2)) & MARK(depth >= VIEW_NEAR) & MARK(depth <= camera->range);
   for (uint left = lane_bits(marks); left != 0; left &= left - 1) {
     const int m = lowest_lane(left);
     __global uint* pixel = image + at[m];
@@ -129,9 +129,9 @@ INLINE void draw_small_discs(const AskedCamera* camera, const ViewDiscs* d, uint
 // Bits of the lanes whose balls may be in the image and within the range. Discs near the camera's plane cannot be told by their pixels.
 INLINE uint balls_in_image(const AskedCamera* camera, Points p, floatv radius) {
   const floatv x_reach = (radius + VIEW_ROUNDING) * camera->side_x, y_reach = (radius + VIEW_ROUNDING) * camera->side_y;
-  return lane_bits(MARK((p.z + radius >= VIEW_NEAR) & (p.z - radius <= camera->range) & (p.x - camera->right * p.z <= x_reach) &
-                        (camera->left * p.z - p.x <= x_reach) & (p.y - camera->bottom * p.z <= y_reach) &
-                        (camera->top * p.z - p.y <= y_reach)));
+  return lane_bits(MARK(p.z + radius >= VIEW_NEAR) & MARK(p.z - radius <= camera->range) & MARK(p.x - camera->right * p.z <= x_reach) &
+                   MARK(camera->left * p.z - p.x <= x_reach) & MARK(p.y - camera->bottom * p.z <= y_reach) &
+                   MARK(camera->top * p.z - p.y <= y_reach));
 }
 
 // Draws LANES surfels, those whose bits are set.
@@ -143,7 +143,7 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   const Points n = rotated(T_camera_local, unpack_normals(s.normal));
   const floatv reach_z = s.radius * square_root(fmax(1.0f - n.z * n.z, 0.0f)), near_z = p.z - reach_z;
   const intv whole = MARK(near_z >= VIEW_NEAR), has_middle = MARK(p.z >= VIEW_NEAR);
-  lanes &= lane_bits(MARK((p.z + reach_z >= VIEW_NEAR) & (near_z <= camera->range)));
+  lanes &= lane_bits(MARK(p.z + reach_z >= VIEW_NEAR) & MARK(near_z <= camera->range));
   if (lanes == 0) return;
 
   // A point q of the disc is off the centre's column by f (q - p) (1, 0, -x / z) / z of q, and off its row alike.
@@ -157,7 +157,7 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   intv low_u, low_v, high_u, high_v;
   pixel_range(u, whole ? reach_u : (floatv)(1e5f), middle_u, camera->width, &low_u, &high_u);
   pixel_range(v, whole ? reach_v : (floatv)(1e5f), middle_v, camera->height, &low_v, &high_v);
-  lanes &= lane_bits(MARK((low_u <= high_u) & (low_v <= high_v)));
+  lanes &= lane_bits(MARK(low_u <= high_u) & MARK(low_v <= high_v));
   if (lanes == 0) return;
 
   const floatv from_plane = dot_products(n, p);
@@ -166,7 +166,7 @@ INLINE void draw_surfels(const AskedCamera* camera, const Transform* T_camera_lo
   const ViewDiscs discs = {
       p,      n,      from_plane, s.radius * s.radius, near_z, p.z + reach_z, has_middle ? middle_u : (intv)(-1), middle_v, low_u, low_v,
       high_u, high_v, kinds};
-  const uint small = lanes & lane_bits(MARK((high_u - low_u < SMALL_DISC) & (high_v - low_v < SMALL_DISC)));
+  const uint small = lanes & lane_bits(MARK(high_u - low_u < SMALL_DISC) & MARK(high_v - low_v < SMALL_DISC));
   if (small != 0) draw_small_discs(camera, &discs, small, image, shared);
   lanes &= ~small;
   if (lanes == 0) return;

@@ -86,9 +86,9 @@ __kernel void count_views(const AskedCamera camera, __global const AskedView* vi
     const floatv z = depths_of_keys(keys);
     const Points p = {divided(convert_floatv(u) - camera.cx, camera.fx) * z, divided((float)v - camera.cy, camera.fy) * z, z};
     const Points at = transformed(&view.T_local_camera, p);
-    const intv inside = MARK((at.x >= view.box_min[0]) & (at.x <= view.box_max[0]) & (at.y >= view.box_min[1]) & (at.y <= view.box_max[1]) &
-                             (at.z >= view.box_min[2]) & (at.z <= view.box_max[2]));
-    const intv counted = exist & ~empty & inside & MARK(((keys & BACK_PIXEL) == 0) & (z >= camera.min_range));
+    const intv inside = MARK(at.x >= view.box_min[0]) & MARK(at.x <= view.box_max[0]) & MARK(at.y >= view.box_min[1]) &
+                        MARK(at.y <= view.box_max[1]) & MARK(at.z >= view.box_min[2]) & MARK(at.z <= view.box_max[2]);
+    const intv counted = exist & ~empty & inside & MARK((keys & BACK_PIXEL) == 0) & MARK(z >= camera.min_range);
     const intv frontier = counted & MARK((keys & FRONTIER_PIXEL) != 0), occupied = counted & ~frontier;
     if (!any_lane(counted)) continue;
     const floatv slope = fmax(convert_floatv(keys & (FRONTIER_PIXEL - 1)) * camera.slope_step, VIEW_LEAST_SLOPE);

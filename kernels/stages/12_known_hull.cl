@@ -101,9 +101,9 @@ __kernel void project_hull(const Frame f, __global const uint* pages, const uint
   s.position = transformed(&f.T_camera_local, s.position);
   const Voxels at = voxels_at(&f.grid, s.position);
   const intv reach = convert_intv(divided(2.0f * f.limits.hull_unknown_scale * s.radius * f.grid.f, fmax(s.position.z, f.grid.z_min))) + 2;
-  const intv near_i = MARK((at.i >= -reach) & (at.i < f.grid.size_i + reach)),
-             near_j = MARK((at.j >= -reach) & (at.j < f.grid.size_j + reach)),
-             near_k = MARK((at.k >= -reach) & (at.k < f.grid.size_k + reach));
+  const intv near_i = MARK(at.i >= -reach) & MARK(at.i < f.grid.size_i + reach),
+             near_j = MARK(at.j >= -reach) & MARK(at.j < f.grid.size_j + reach),
+             near_k = MARK(at.k >= -reach) & MARK(at.k < f.grid.size_k + reach);
   const intv beyond_i = MARK((at.i < 0) | (at.i >= f.grid.size_i)), beyond_j = MARK((at.j < 0) | (at.j >= f.grid.size_j)),
              beyond_k = MARK((at.k < 0) | (at.k >= f.grid.size_k));
   uint left = lanes & lane_bits((beyond_i & near_j & near_k) | (beyond_j & near_i & near_k) | (beyond_k & near_i & near_j));

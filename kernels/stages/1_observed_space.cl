@@ -16,10 +16,10 @@ __kernel void column_ends(const Grid g, __global const float* depth, __global co
   if (row >= g.height) return;
   const intv column = first + lane_numbers(), pixel = row * g.width + min(column, g.width - 1);
   const floatv d = fabs(gather_float(depth, pixel));
-  const intv is_valid = MARK((d > 0.0f) & (column < g.width));
+  const intv is_valid = MARK(d > 0.0f) & MARK(column < g.width);
   intv end = clamp(ceil_int(layers_at(&g, d)), 0, g.size_k);  // z(end - 1) < d <= z(end), but for rounding
-  end += MARK((end > 0) & (gather_float(layer_depth, max(end - 1, 0)) >= d));
-  end -= MARK((end < g.size_k) & (gather_float(layer_depth, min(end, g.size_k - 1)) < d));
+  end += MARK(end > 0) & MARK(gather_float(layer_depth, max(end - 1, 0)) >= d);
+  end -= MARK(end < g.size_k) & MARK(gather_float(layer_depth, min(end, g.size_k - 1)) < d);
   end = is_valid ? end : 0;
   store_lane_bits(lane_bits(is_valid), get_global_id(0), valid);
   store_first(end, g.width - first, column_end + row * g.width + first);
@@ -77,7 +77,7 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
   const int t = j - g->padding_j;
   if (t < 0 || t >= g->height) return 0;
   const intv s = i - g->padding_i + lane_numbers();
-  const intv in_image = MARK((s >= 0) & (s < g->width));
+  const intv in_image = MARK(s >= 0) & MARK(s < g->width);
   return in_image ? gather_int(column_end, t * g->width + clamp(s, 0, g->width - 1)) : 0;
 }
 
@@ -129,10 +129,11 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
 INLINE intv at_surface(const Grid* g, __global const float* depth, __global const int* column_end, float surface_depth, Voxels v, floatv z,
                        intv asked, intv* pixel) {
   const intv s = v.i - g->padding_i, t = v.j - g->padding_j;
-  const intv in_image = asked & MARK((s >= 0) & (t >= 0) & (s < g->width) & (t < g->height) & (convert_floatv(v.k) > g->k_min));
+  const intv in_image =
+      asked & MARK(s >= 0) & MARK(t >= 0) & MARK(s < g->width) & MARK(t < g->height) & MARK(convert_floatv(v.k) > g->k_min);
   *pixel = in_image ? t * g->width + s : 0;
   if (!any_lane(in_image)) return 0;
   const floatv d = gather_float(depth, *pixel);
-  const intv ends = MARK((v.k == gather_int(column_end, *pixel)) & (v.k > g->first_pyramid_layer));
-  return in_image & MARK(d > 0.0f) & (ends | MARK((z >= d) & (z <= d + surface_depth)));
+  const intv ends = MARK(v.k == gather_int(column_end, *pixel)) & MARK(v.k > g->first_pyramid_layer);
+  return in_image & MARK(d > 0.0f) & (ends | (MARK(z >= d) & MARK(z <= d + surface_depth)));
 }

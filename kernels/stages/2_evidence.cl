@@ -20,7 +20,7 @@ typedef struct {
 //   s, t: columns and rows
 INLINE MeasuredPoints points_of_pixels(const Grid* g, const TakeBackLimits* limits, __global const float* depth, intv s, intv t) {
   MeasuredPoints m;
-  const intv inside = MARK((s < g->width) & (t < g->height));
+  const intv inside = MARK(s < g->width) & MARK(t < g->height);
   const floatv d = gather_float(depth, inside ? t * g->width + s : 0);
   m.measured = inside & MARK(d > 0.0f);
   m.p.x = divided((convert_floatv(s + g->padding_i) - g->center_i) * d, g->fx);
@@ -36,8 +36,8 @@ INLINE MeasuredPoints points_of_pixels(const Grid* g, const TakeBackLimits* limi
 INLINE intv pixels_in_view(const View* view, Points p, intv asked, Points* q, intv* s, intv* t) {
   *q = transformed(&view->to_image, p);
   const floatv scale = divided(1.0f, q->z), x = q->x * scale, y = q->y * scale;
-  const intv inside =
-      asked & MARK((q->z > 0.0f) & (x >= 1.0f) & (y >= 1.0f) & (x < (float)(view->width - 1)) & (y < (float)(view->height - 1)));
+  const intv inside = asked & MARK(q->z > 0.0f) & MARK(x >= 1.0f) & MARK(y >= 1.0f) & MARK(x < (float)(view->width - 1)) &
+                      MARK(y < (float)(view->height - 1));
   *s = inside ? convert_intv(x) : 1;
   *t = inside ? convert_intv(y) : 1;
   return inside;
@@ -57,7 +57,7 @@ INLINE intv frame_supports(const View* view, __global const float* images, Point
     nearest = fmin(nearest, d > 0.0f ? d : (floatv)(INFINITY));
     farthest = fmax(farthest, d);
   }
-  return inside & MARK((q.z >= nearest - margin) & (q.z <= farthest + margin));
+  return inside & MARK(q.z >= nearest - margin) & MARK(q.z <= farthest + margin);
 }
 
 INLINE floatv depths_at(const View* view, __global const ushort* depths, intv s, intv t) {
@@ -156,7 +156,7 @@ typedef struct {
 
 // Which of LANES pixels have not heard enough opinions yet?
 INLINE intv undecided(const TakeBackLimits* limits, const Opinions* o, intv open) {
-  return open & MARK((o->weak + o->agree < limits->opinions) & (o->newer < limits->newer_opinions));
+  return open & MARK(o->weak + o->agree < limits->opinions) & MARK(o->newer < limits->newer_opinions);
 }
 
 // Adds those of the next view.
@@ -255,9 +255,9 @@ INLINE intv evidence_of(const Frame* f, const TakeBackLimits* limits, const Witn
     o.weak = by_seen ? max(o.weak, limits->contradictions) : o.weak;
     o.strong = deep_in_seen_space(f, &w->seen, m->p, margins.strong, by_seen) ? max(o.strong, limits->contradictions) : o.strong;
   }
-  const intv is_weak = open & MARK((o.weak >= limits->contradictions) & (o.weak >= 2 * o.agree)),
-             is_strong = is_weak & MARK((o.strong >= limits->contradictions) &
-                                        (LAST_FRAMES * support.supports >= -limits->strong_supports * support.looked));
+  const intv is_weak = open & MARK(o.weak >= limits->contradictions) & MARK(o.weak >= 2 * o.agree),
+             is_strong = is_weak & MARK(o.strong >= limits->contradictions) &
+                         MARK(LAST_FRAMES * support.supports >= -limits->strong_supports * support.looked);
   return is_strong ? STRONG_EVIDENCE : is_weak ? WEAK_EVIDENCE : NO_EVIDENCE;
 }
 

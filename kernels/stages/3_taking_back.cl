@@ -8,11 +8,11 @@ INLINE intv behind_chosen(const Grid* g, const TakeBackLimits* limits, const Vie
                           __global const uchar* chosen, Points p) {
   const Points q = transformed(&own_view->to_image, p);
   const floatv scale = divided(1.0f, q.z), s = q.x * scale, t = q.y * scale;
-  intv behind = MARK((q.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < (float)g->width) & (t < (float)g->height));
+  intv behind = MARK(q.z > 0.0f) & MARK(s >= 0.0f) & MARK(t >= 0.0f) & MARK(s < (float)g->width) & MARK(t < (float)g->height);
   if (!any_lane(behind)) return 0;
   const intv pixel = behind ? convert_intv(t) * g->width + convert_intv(s) : 0;
   const floatv d = gather_float(depth, pixel);
-  behind &= MARK((q.z >= d) & (q.z <= d + limits->reach * voxel_size(g, d)));
+  behind &= MARK(q.z >= d) & MARK(q.z <= d + limits->reach * voxel_size(g, d));
   uint marks = lane_bits(behind);
   int at[LANES];
   vstorev(pixel, 0, at);

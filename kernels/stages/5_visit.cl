@@ -11,8 +11,8 @@ INLINE intv reach_grid(const Grid* g, const Limits* limits, const Surfels* s, fl
   const floatv reach = fmax(divided(2.0f * s->radius, voxel), limits->thickness) + REACH_MARGIN;
   const floatv i = p.x * slope * g->fx + g->center_i, j = p.y * slope * g->fy + g->center_j;
   const floatv reach_i = reach * (1.0f + fabs(p.x * slope)), reach_j = reach * (1.0f + fabs(p.y * slope));
-  return MARK((p.z >= -((float)g->padding_k + reach) * voxel) & (p.z <= g->z_max + 2.0f * reach * voxel) & (i > -reach_i) &
-              (i < (float)g->size_i + reach_i) & (j > -reach_j) & (j < (float)g->size_j + reach_j));
+  return MARK(p.z >= -((float)g->padding_k + reach) * voxel) & MARK(p.z <= g->z_max + 2.0f * reach * voxel) & MARK(i > -reach_i) &
+         MARK(i < (float)g->size_i + reach_i) & MARK(j > -reach_j) & MARK(j < (float)g->size_j + reach_j);
 }
 
 // Which surfels this frame's view takes away, of those that are asked.

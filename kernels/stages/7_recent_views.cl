@@ -23,9 +23,9 @@ INLINE intv count_known(const Grid* g, int3 tile, __global const float* layer_de
     const int entry = own->entries[(own->entry_count - 1) * n / (PROBES - 1)];
     const Points p = point_in_views(v, entry_center(g, tile, layer_depth, entry));
     const floatv scale = 1.0f / p.z, s = p.x * v->fx * scale + v->cx, t = p.y * v->fy * scale + v->cy;
-    const intv seen = MARK((p.z > 0.0f) & (s >= 0.0f) & (t >= 0.0f) & (s < v->width) & (t < v->height));
+    const intv seen = MARK(p.z > 0.0f) & MARK(s >= 0.0f) & MARK(t >= 0.0f) & MARK(s < v->width) & MARK(t < v->height);
     const uintv pixel = v->first_pixel + view_pixels(convert_uintv(v->width), convert_uintv(s), convert_uintv(t));
-    counts -= seen & MARK(p.z < view_depths(depths, seen ? as_intv(pixel) : 0, depth_step));
+    counts -= seen & MARK(p.z < view_depths(depths, seen & as_intv(pixel), depth_step));
   }
   return counts;
 }
