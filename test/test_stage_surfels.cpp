@@ -49,7 +49,7 @@ __kernel void test_marks(__global int* out, __global const ulong* in) {
 __kernel void test_comparisons(__global int4* out, __global const float4* in) {
   const int first = LANES * get_global_id(0);
   const Points p = load_points(in + first);
-  const intv less = MARK(p.x < p.y), both = MARK((p.x < p.y) & (p.y < p.z));
+  const intv less = MARK(p.x < p.y), both = MARK(p.x < p.y) & MARK(p.y < p.z);
   const floatv smaller = less ? p.x : p.y;
   store_elements(less, both, ~less & MARK(p.y < p.z), as_intv(smaller), first, out);
 }

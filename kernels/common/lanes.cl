@@ -74,16 +74,16 @@ typedef OF_LANES(ulong) ulongv;
 #if LANES == 16
 INLINE intv lane_numbers(void) { return (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
 
+// separate_marks gives the marks of one comparison. lane_bits makes a number whose bit n says whether lane n is marked.
 #if defined(ON_CPU) && defined(__clang__) && defined(__AVX2__) && !defined(__AVX512F__)
-// For processors with AVX2 and without AVX-512. LLVM joins comparisons before it makes marks of them. There, it packs 16 comparisons into
-// bytes to do so, and unpacks them again. This hides from it that marks come from comparisons, so that they stay as they are.
+// LLVM would join comparisons before it makes marks of them. For processors with AVX2 and without AVX-512 it would pack 16 comparisons into
+// bytes to do so, and then unpack them. This hides from it that marks come from comparisons.
 INLINE intv separate_marks(intv marks) {
   int8 low = marks.lo, high = marks.hi;
   __asm__("" : "+x"(low), "+x"(high));
   return (intv)(low, high);
 }
 
-// A number whose bit n says whether lane n is marked.
 INLINE uint lane_bits(intv marks) {
   const float8 low = as_float8(marks.lo), high = as_float8(marks.hi);
   return (uint)__builtin_ia32_movmskps256(low) | (uint)__builtin_ia32_movmskps256(high) << 8;

@@ -104,8 +104,8 @@ __kernel void project_hull(const Frame f, __global const uint* pages, const uint
   const intv near_i = MARK(at.i >= -reach) & MARK(at.i < f.grid.size_i + reach),
              near_j = MARK(at.j >= -reach) & MARK(at.j < f.grid.size_j + reach),
              near_k = MARK(at.k >= -reach) & MARK(at.k < f.grid.size_k + reach);
-  const intv beyond_i = MARK((at.i < 0) | (at.i >= f.grid.size_i)), beyond_j = MARK((at.j < 0) | (at.j >= f.grid.size_j)),
-             beyond_k = MARK((at.k < 0) | (at.k >= f.grid.size_k));
+  const intv beyond_i = MARK(at.i < 0) | MARK(at.i >= f.grid.size_i), beyond_j = MARK(at.j < 0) | MARK(at.j >= f.grid.size_j),
+             beyond_k = MARK(at.k < 0) | MARK(at.k >= f.grid.size_k);
   uint left = lanes & lane_bits((beyond_i & near_j & near_k) | (beyond_j & near_i & near_k) | (beyond_k & near_i & near_j));
   if (left == 0) return;
   ViewSurfel placed[LANES];

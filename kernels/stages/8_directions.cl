@@ -32,7 +32,8 @@ INLINE int observed_layers(const Grid* g, __global const ulong* observed, int at
 INLINE int observed_around(const Grid* g, __global const ulong* observed, int i, int j, int k) {
   const int w = k >> 6, bit = k & 63;
   int around = 0;
-  if (i > 0 && j > 0 && i + 1 < g->size_i && j + 1 < g->size_j && bit > 0 && bit < 63) {  // most voxels: nothing is in another word
+  // Most voxels: all columns are in the grid, and the three layers of each are in one word.
+  if (i > 0 && j > 0 && i + 1 < g->size_i && j + 1 < g->size_j && bit > 0 && bit < 63) {
     const int at = word_index(g, i, j, w), row = word_index(g, i, j + 1, w) - at;
     for (int dj = -1; dj <= 1; ++dj)
       for (int di = -1; di <= 1; ++di) around |= ((int)(observed[at + dj * row + di] >> (bit - 1)) & 7) << AROUND(di, dj, -1);
