@@ -4,14 +4,9 @@
 
 namespace frontier_surfels {
 
-const BlockIndex::Pages* BlockIndex::find(const BlockKey& block) const {
-  const auto found = blocks_.find(block);
-  return found == blocks_.end() ? nullptr : &found->second;
-}
-
 std::uint32_t BlockIndex::add_page(const BlockKey& block) {
   std::uint32_t page = end_;
-  Pages& pages = blocks_[block];
+  Pages& pages = blocks_.at_or_new(block);
   if (free_.empty()) {
     pages.push_back(page);
     ++end_;
@@ -30,9 +25,9 @@ BlockIndex::Pages BlockIndex::next_pages(std::size_t count) const {
 }
 
 void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_t end) {
-  const auto found = blocks_.find(block);
-  found->second.pop_back();
-  if (found->second.empty()) blocks_.erase(found);
+  Pages* pages = blocks_.find(block);
+  pages->pop_back();
+  if (pages->empty()) blocks_.erase(block);
   if (page >= end)
     --end_;
   else
@@ -40,9 +35,9 @@ void BlockIndex::take_back(const BlockKey& block, std::uint32_t page, std::size_
 }
 
 void BlockIndex::remove_pages(const BlockKey& block, const Pages& removed, std::uint32_t frame) {
-  const auto found = blocks_.find(block);
-  if (found == blocks_.end()) return;
-  Pages& pages = found->second;
+  Pages* found = blocks_.find(block);
+  if (found == nullptr) return;
+  Pages& pages = *found;
   auto next = removed.begin();
   auto kept = pages.begin();
   for (const std::uint32_t page : pages) {
@@ -57,7 +52,7 @@ void BlockIndex::remove_pages(const BlockKey& block, const Pages& removed, std::
       removed_.emplace_back(frame, page);
   }
   pages.erase(kept, pages.end());
-  if (pages.empty()) blocks_.erase(found);
+  if (pages.empty()) blocks_.erase(block);
 }
 
 void BlockIndex::release(std::uint64_t frame) {
@@ -77,15 +72,14 @@ BlockIndex BlockIndex::emptied(std::uint32_t frame) const {
   empty.free_ = free_;
   std::sort(empty.free_.rbegin(), empty.free_.rend());  // descending, as add_page() takes the last
   empty.removed_ = removed_;
-  for (const auto& [block, pages] : blocks_)
+  for (const auto& [block, pages] : blocks())
     for (const std::uint32_t page : pages) empty.removed_.emplace_back(frame, page);
   std::sort(empty.removed_.begin(), empty.removed_.end());  // the table of blocks has no order
   return empty;
 }
 
 std::size_t BlockIndex::bytes() const {
-  constexpr std::size_t kNode = sizeof(BlockKey) + sizeof(Pages) + 2 * sizeof(void*) + 8;  // of the hash table, with its bucket
-  return blocks_.size() * kNode + used() * 2 * sizeof(std::uint32_t) + free_.capacity() * sizeof(std::uint32_t) +
+  return blocks_.bytes() + used() * 2 * sizeof(std::uint32_t) + free_.capacity() * sizeof(std::uint32_t) +
          removed_.capacity() * sizeof(removed_[0]);
 }
 

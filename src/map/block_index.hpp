@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "map/block_key.hpp"
+#include "map/block_map.hpp"
 
 namespace frontier_surfels {
 
@@ -15,7 +14,13 @@ class BlockIndex {
   using Pages = std::vector<std::uint32_t>;
 
   /// Pages of a block in the order in which they were added; nullptr if the block has none.
-  const Pages* find(const BlockKey& block) const;
+  const Pages* find(const BlockKey& block) const { return blocks_.find(block); }
+
+  /// Calls use(cell, block, pages) for the blocks in a window, in no particular order.
+  template <typename Use>
+  void for_each_in(const Window& window, const Use& use) const {
+    blocks_.for_each_in(window, use);
+  }
 
   /// Adds one page to a block: a free page if there is one, else the page at end(). @return number of the page
   std::uint32_t add_page(const BlockKey& block);
@@ -41,10 +46,10 @@ class BlockIndex {
   std::size_t end() const { return end_; }                                    ///< one past the last page ever used
   std::size_t used() const { return end_ - free_.size() - removed_.size(); }  ///< pages that belong to a block
   std::size_t bytes() const;                                                  ///< host memory of the index, estimated
-  const std::unordered_map<BlockKey, Pages>& blocks() const { return blocks_; }
+  const BlockMap<Pages>::Table& blocks() const { return blocks_.table(); }
 
  private:
-  std::unordered_map<BlockKey, Pages> blocks_;
+  BlockMap<Pages> blocks_;
   Pages free_;                                                    ///< add_page() takes the last one
   std::vector<std::pair<std::uint32_t, std::uint32_t>> removed_;  ///< frame and page of those that are not free yet
   std::uint32_t end_ = 0;

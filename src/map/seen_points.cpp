@@ -64,7 +64,7 @@ SeenPoints::SeenPoints(Commands& commands, double block_size)
 /// The device gets it with the next send_entries().
 void SeenPoints::clear() {
   fixed_ = false;
-  table_of_.clear();
+  table_of_ = {};
   tables_.assign(bricks_of_block(), SEEN_BRICK_EMPTY);
   full_bricks_.assign(1, 0);
   free_tables_.clear();
@@ -104,17 +104,13 @@ double SeenPoints::spacing() const { return block_size_ / (SEEN_BRICK << shift_)
 void SeenPoints::open_window(const MapWindow& window) {
   send_entries("remembering");
   auto tables = std::make_shared<std::vector<cl_int>>(window.cells(), 0);
-  for (int cell = 0; cell < window.cells(); ++cell) {
-    const auto found = table_of_.find(window.block(cell));
-    if (found != table_of_.end()) (*tables)[cell] = found->second;
-  }
+  table_of_.for_each_in(window.window(), [&](int cell, const BlockKey&, int table) { (*tables)[cell] = table; });
   window_tables_ = std::move(tables);
   slots_.send(window_tables_);
 }
 
 int SeenPoints::table(const BlockKey& block) {
-  const auto found = table_of_.find(block);
-  if (found != table_of_.end()) return found->second;
+  if (const int* found = table_of_.find(block); found != nullptr) return *found;
   int number = static_cast<int>(full_bricks_.size());
   if (free_tables_.empty()) {
     full_bricks_.push_back(0);
@@ -123,7 +119,7 @@ int SeenPoints::table(const BlockKey& block) {
     number = free_tables_.back();
     free_tables_.pop_back();
   }
-  table_of_.emplace(block, number);
+  table_of_.at_or_new(block) = number;
   fixed_ = true;  // also when all blocks have moved to the archive
   return number;
 }
@@ -217,7 +213,7 @@ std::vector<SeenPoints::PartlyForgotten> SeenPoints::bricks_in(const Eigen::Alig
   std::vector<PartlyForgotten> partly;
   for (const BlockKey& key : blocks())
     for (int brick = 0; brick < bricks_of_block(); ++brick) {
-      const int table = table_of_.at(key);
+      const int table = *table_of_.find(key);
       const cl_int own = entry(table, brick);
       const PointRange inside = points.in_brick(key, shift_, brick);
       if (inside.empty() || own == SEEN_BRICK_EMPTY) continue;
@@ -271,7 +267,7 @@ std::vector<cl_uchar> SeenPoints::forget_points(const std::vector<PartlyForgotte
 
 std::vector<BlockKey> SeenPoints::blocks() const {
   std::vector<BlockKey> blocks;
-  for (const auto& [block, table] : table_of_) blocks.push_back(block);
+  for (const auto& [block, table] : table_of_.table()) blocks.push_back(block);
   std::sort(blocks.begin(), blocks.end());
   return blocks;
 }
@@ -292,7 +288,7 @@ std::vector<int> SeenPoints::bricks_with_points(int table) const {
 
 std::vector<BlockKey> SeenPoints::blocks_with_points() const {
   std::vector<BlockKey> blocks;
-  for (const auto& [block, table] : table_of_) {
+  for (const auto& [block, table] : table_of_.table()) {
     const auto begin = tables_.begin() + at(table, 0);
     if (std::any_of(begin, begin + bricks_of_block(), [](cl_int entry) { return entry != SEEN_BRICK_EMPTY; })) blocks.push_back(block);
   }
@@ -306,11 +302,11 @@ std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector
   std::vector<std::vector<std::uint8_t>> stored(blocks.size());
   std::vector<cl_int> mixed;
   for (std::size_t n = 0; n < blocks.size(); ++n) {
-    const auto found = table_of_.find(blocks[n]);
-    if (found == table_of_.end()) continue;
+    const int* table = table_of_.find(blocks[n]);
+    if (table == nullptr) continue;
     bool any = false;
     for (int brick = 0; brick < bricks; ++brick) {
-      const cl_int number = entry(found->second, brick);
+      const cl_int number = entry(*table, brick);
       any = any || number != SEEN_BRICK_EMPTY;
       stored[n].push_back(number == SEEN_BRICK_EMPTY ? SEEN_NONE : number == SEEN_BRICK_FULL ? SEEN_ALL : SEEN_MIXED);
       if (number > SEEN_BRICK_FULL) mixed.push_back(number);
@@ -375,21 +371,21 @@ void SeenPoints::scatter(std::vector<cl_int> numbers, const std::vector<cl_ulong
 
 /// The change of the tables waits for the next send_entries(): until then no table sent by open_window() has the block.
 void SeenPoints::drop_block(const BlockKey& block) {
-  const auto found = table_of_.find(block);
-  if (found == table_of_.end()) return;
+  const int* found = table_of_.find(block);
+  if (found == nullptr) return;
+  const int table = *found;
   for (int brick = 0; brick < bricks_of_block(); ++brick) {
-    const cl_int number = entry(found->second, brick);
+    const cl_int number = entry(table, brick);
     if (number == SEEN_BRICK_EMPTY) continue;
     if (number > SEEN_BRICK_FULL) free_.push_back(number);
-    set_entry(found->second, brick, SEEN_BRICK_EMPTY);
+    set_entry(table, brick, SEEN_BRICK_EMPTY);
   }
-  free_tables_.push_back(found->second);
-  table_of_.erase(found);
+  free_tables_.push_back(table);
+  table_of_.erase(block);
 }
 
 std::size_t SeenPoints::bytes() const {
-  constexpr std::size_t kBlock = sizeof(BlockKey) + 4 * sizeof(void*);  // in the hash table
-  return SEEN_WORDS * sizeof(cl_ulong) * used_ + 2 * sizeof(cl_int) * tables_.size() + table_of_.size() * (kBlock + sizeof(int));
+  return SEEN_WORDS * sizeof(cl_ulong) * used_ + 2 * sizeof(cl_int) * tables_.size() + table_of_.bytes();
 }
 
 }  // namespace frontier_surfels

@@ -7,13 +7,13 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "common/shared.h"
 #include "frontier_surfels/types.hpp"
 #include "map/block_key.hpp"
+#include "map/block_map.hpp"
 #include "map/map_window.hpp"
 #include "opencl/commands.hpp"
 
@@ -47,7 +47,7 @@ class SeenPoints {
   static int shift_for_spacing(double block_size, double spacing);
   double spacing() const;               ///< distance of the lattice's points [m]
   int shift() const { return shift_; }  ///< log2 of the number of bricks along a block's edge
-  bool empty() const { return table_of_.empty(); }
+  bool empty() const { return table_of_.table().empty(); }
 
   /// Sends the tables of a window's blocks, for questions about points in it, and what send_entries() has not sent yet.
   void open_window(const MapWindow& window);
@@ -123,7 +123,7 @@ class SeenPoints {
   const double block_size_;  ///< [m]
   int shift_ = 2;
   bool fixed_ = false;  ///< by choose_shift(), or because something has been remembered
-  std::unordered_map<BlockKey, int> table_of_;
+  BlockMap<int> table_of_;
   std::vector<cl_int> tables_;                                ///< the device's tables; the host is their master
   std::vector<int> full_bricks_;                              ///< of each table: number of entries that are SEEN_BRICK_FULL
   std::vector<int> free_tables_;                              ///< of blocks that were dropped; the last one is used next

@@ -96,12 +96,10 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
   begin_undo();
   choose_spare_pages();
   largest_radius_ = largest;
-  listed_.clear();
-  for (int cell = 0; cell < window_.cells(); ++cell) {
-    const BlockKey block = window_.block(cell);
-    const BlockIndex::Pages* pages = index_.find(block);
-    listed_.push_back(pages != nullptr && window_.meets_grid(block) ? pages : nullptr);
-  }
+  listed_.assign(static_cast<std::size_t>(window_.cells()), nullptr);
+  index_.for_each_in(window_.window(), [&](int cell, const BlockKey& block, const BlockIndex::Pages& pages) {
+    if (window_.meets_grid(block)) listed_[static_cast<std::size_t>(cell)] = &pages;
+  });
   list_window();
 }
 
