@@ -36,7 +36,7 @@ INLINE int observed_around(const Grid* g, __global const ulong* observed, int i,
   if (i > 0 && j > 0 && i + 1 < g->size_i && j + 1 < g->size_j && bit > 0 && bit < 63) {
     const int at = word_index(g, i, j, w), row = word_index(g, i, j + 1, w) - at;
     for (int dj = -1; dj <= 1; ++dj)
-      for (int di = -1; di <= 1; ++di) around |= ((int)(observed[at + dj * row + di] >> (bit - 1)) & 7) << AROUND(di, dj, -1);
+      for (int di = -1; di <= 1; ++di) around |= observed_layers(g, observed, at + dj * row + di, w, bit) << AROUND(di, dj, -1);
     return around;
   }
   for (int dj = -1; dj <= 1; ++dj)

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/shared.h"
+#include "map/bits.hpp"
 #include "map/block_key.hpp"
 
 namespace frontier_surfels {
@@ -49,6 +50,11 @@ class BlockMap {
     const BlockKey first = {window.origin_x, window.origin_y, window.origin_z};
     const BlockKey low = word_of(first),
                    high = word_of({first.x + window.size_x - 1, first.y + window.size_y - 1, first.z + window.size_z - 1});
+    const auto along = [](int from, int to) { return static_cast<std::size_t>(to - from + 1); };
+    if (words_.size() < along(low.x, high.x) * along(low.y, high.y) * along(low.z, high.z)) {
+      for (const auto& [word, bits] : words_) use_word(window, word, bits, use);
+      return;
+    }
     for (int z = low.z; z <= high.z; ++z)
       for (int y = low.y; y <= high.y; ++y)
         for (int x = low.x; x <= high.x; ++x) {
@@ -73,13 +79,13 @@ class BlockMap {
 
   template <typename Use>
   void use_word(const Window& window, const BlockKey& word, std::uint64_t bits, const Use& use) const {
-    for (; bits != 0; bits &= bits - 1) {
-      const int bit = __builtin_ctzll(bits);
+    for_each_bit(bits, [&](std::uint32_t number) {
+      const int bit = static_cast<int>(number);
       const BlockKey block = {4 * word.x + (bit & 3), 4 * word.y + (bit >> 2 & 3), 4 * word.z + (bit >> 4)};
       const int x = block.x - window.origin_x, y = block.y - window.origin_y, z = block.z - window.origin_z;
-      if (x < 0 || y < 0 || z < 0 || x >= window.size_x || y >= window.size_y || z >= window.size_z) continue;
+      if (x < 0 || y < 0 || z < 0 || x >= window.size_x || y >= window.size_y || z >= window.size_z) return;
       use((z * window.size_y + y) * window.size_x + x, block, table_.find(block)->second);
-    }
+    });
   }
 
   Table table_;

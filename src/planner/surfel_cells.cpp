@@ -13,23 +13,12 @@ constexpr const char* kStage = "boundaries";
 constexpr int kMostCells = 8;                                 // along a block's edge
 constexpr std::size_t kCellsOfWindow = std::size_t{1} << 20;  // a larger window gets larger cells
 
-bool contains(const Window& w, const BlockKey& block) {
-  const auto within = [](int at, int origin, int size) { return at >= origin && at - origin < size; };
-  return within(block.x, w.origin_x, w.size_x) && within(block.y, w.origin_y, w.size_y) && within(block.z, w.origin_z, w.size_z);
-}
-
 }  // namespace
 
 std::vector<cl_uint> pages_of(const MapWindow& window, const BlockIndex& index) {
   std::vector<cl_uint> pages;
-  const auto add = [&](const BlockIndex::Pages& own) { pages.insert(pages.end(), own.begin(), own.end()); };
-  if (static_cast<std::size_t>(window.cells()) < index.blocks().size()) {
-    for (int cell = 0; cell < window.cells(); ++cell)
-      if (const BlockIndex::Pages* own = index.find(window.block(cell))) add(*own);
-  } else {
-    for (const auto& [block, own] : index.blocks())
-      if (contains(window.window(), block)) add(own);
-  }
+  index.for_each_in(window.window(),
+                    [&](int, const BlockKey&, const BlockIndex::Pages& own) { pages.insert(pages.end(), own.begin(), own.end()); });
   return pages;
 }
 
