@@ -282,59 +282,50 @@ INLINE void store_bytes(intv values, int count, __global uchar* to) {
   for (int n = 0; n < min(count, LANES); ++n) to[n] = (uchar)some[n];
 }
 
-// Evidence at every TAKE_SQUARE-th column and row: every square has one of these pixels. One work item handles LANES of them, or a team of
-// work items handles one.
-//   in  depth[height][width] [m]: of this frame;  last_frames[frame_count], images;  views[view_count], depths: as in Witnesses
-//       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
-//   out coarse[coarse rows][coarse columns]: evidence
-__kernel void weigh_coarsely(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
-                             const int frame_count, __global const float* images, __global const View* views, const int view_count,
-                             __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
-                             __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
-                             __global const int* taken_bricks, __global uchar* coarse) {
-  __local Team told;
-  const int columns = coarse_size(f.grid.width), pixels = columns * coarse_size(f.grid.height),
-            first = LANES * ((int)get_global_id(0) / VIEW_TEAM);
-  if (VIEW_TEAM == 1 && first >= pixels) return;
-  const Witnesses w = {
-      last_frames, images,     views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
-      frame_count, view_count, &told};
-  const intv n = first + lane_numbers(), row = quotients(n, columns);
-  const MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, TAKE_SQUARE * (n - row * columns), TAKE_SQUARE * row);
-  const intv evidence = evidence_of(&f, &limits, &w, &m);
-  if (first >= pixels || get_global_id(0) % VIEW_TEAM != 0) return;
-  store_bytes(evidence, pixels - first, coarse + first);
+// Can a pixel of a chunk belong to a square with strong evidence, or be near enough to one? Every square has a pixel of the coarse image.
+//   coarse[coarse rows][coarse columns]: evidence there;  column, row: the chunk's first pixel
+INLINE bool is_near_evidence(const Grid* g, __global const uchar* coarse, int column, int row) {
+  const int columns = coarse_size(g->width), rows = coarse_size(g->height), reach = TAKE_SQUARE / 2 + TAKE_GROWTH;
+  bool near = false;
+  for (int y = max(row - reach, 0) / TAKE_SQUARE; y <= min((row + reach) / TAKE_SQUARE, rows - 1); ++y)
+    for (int x = max(column - reach, 0) / TAKE_SQUARE; x <= min((column + LANES - 1 + reach) / TAKE_SQUARE, columns - 1); ++x)
+      near = near || coarse[y * columns + x] == STRONG_EVIDENCE;
+  return near;
 }
 
-// Evidence of all pixels that may belong to a square with strong evidence, or be near enough to one; none of the others. One work item
-// handles LANES pixels of a row, or a team of them one; the first of work item or team n is pixel LANES n of rows that are filled up to
-// whole chunks.
-//   in  as weigh_coarsely;  coarse: of it
-//   out evidence[height][width]
+// Evidence of pixels, in two launches: of every TAKE_SQUARE-th column and row, and then of all that are near to what has strong evidence
+// there. One work item handles LANES pixels, or a team of work items handles one. Chunks begin anew in each row of the whole image, but not
+// in those of the coarse one, which are short.
+//   in  depth[height][width] [m]: of this frame;  last_frames[frame_count], images;  views[view_count], depths: as in Witnesses
+//       seen_..., taken_...: slots, tables, bricks of the seen points (common/seen_points.cl), and of those that were taken back
+//       step: TAKE_SQUARE, then 1;  coarse: what the first launch has found
+//   out evidence[rows][columns]: of the coarse image, then of the whole one
 __kernel void weigh_evidence(const Frame f, const TakeBackLimits limits, __global const float* depth, __global const View* last_frames,
                              const int frame_count, __global const float* images, __global const View* views, const int view_count,
                              __global const ushort* depths, __global const int* seen_slots, __global const int* seen_tables,
                              __global const int* seen_bricks, __global const int* taken_slots, __global const int* taken_tables,
-                             __global const int* taken_bricks, __global const uchar* coarse, __global uchar* evidence) {
+                             __global const int* taken_bricks, const int step, __global const uchar* coarse, __global uchar* evidence) {
   __local Team told;
-  const int chunks = chunks_of(f.grid.width), n = get_global_id(0) / VIEW_TEAM, t = n / chunks, first = LANES * (n % chunks);
-  if (VIEW_TEAM == 1 && t >= f.grid.height) return;
-  const int columns = coarse_size(f.grid.width), rows = coarse_size(f.grid.height), reach = TAKE_SQUARE / 2 + TAKE_GROWTH;
-  bool near = false;
-  for (int row = max(t - reach, 0) / TAKE_SQUARE; row <= min((t + reach) / TAKE_SQUARE, rows - 1); ++row)
-    for (int column = max(first - reach, 0) / TAKE_SQUARE; column <= min((first + LANES - 1 + reach) / TAKE_SQUARE, columns - 1); ++column)
-      near = near || coarse[row * columns + column] == STRONG_EVIDENCE;
+  const bool is_coarse = step > 1;
+  const int columns = is_coarse ? coarse_size(f.grid.width) : f.grid.width, rows = is_coarse ? coarse_size(f.grid.height) : f.grid.height,
+            width = is_coarse ? columns : LANES * chunks_of(columns), first = LANES * ((int)get_global_id(0) / VIEW_TEAM);
+  if (VIEW_TEAM == 1 && first >= rows * width) return;
+  const bool near = is_coarse || is_near_evidence(&f.grid, coarse, first % width, first / width);
   intv found = NO_EVIDENCE;
   if (any_of_group(near, &told)) {
     const Witnesses w = {
         last_frames, images,     views, depths, {seen_slots, seen_tables, seen_bricks}, {taken_slots, taken_tables, taken_bricks},
         frame_count, view_count, &told};
-    MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, first + lane_numbers(), (intv)(t));
+    const intv n = first + lane_numbers(), row = quotients(n, width);
+    MeasuredPoints m = points_of_pixels(&f.grid, &limits, depth, step * (n - row * width), step * row);
     m.measured &= near ? (intv)(-1) : (intv)(0);
     found = evidence_of(&f, &limits, &w, &m);
   }
-  if (t >= f.grid.height || get_global_id(0) % VIEW_TEAM != 0) return;
-  store_bytes(found, f.grid.width - first, evidence + t * f.grid.width + first);
+  if (first >= rows * width || get_global_id(0) % VIEW_TEAM != 0) return;
+  if (is_coarse)
+    store_bytes(found, rows * columns - first, evidence + first);
+  else
+    store_bytes(found, columns - first % width, evidence + first / width * columns + first % width);
 }
 
 // Middles of squares of TAKE_SQUARE x TAKE_SQUARE pixels that all have strong evidence. One work item handles a pixel.

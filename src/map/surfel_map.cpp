@@ -107,7 +107,7 @@ void SurfelMap::open_window(const Grid& grid, const Eigen::Isometry3d& T_world_c
 void SurfelMap::choose_spare_pages() {
   if (commands_.shape().is_near) return;
   spare_pages_ = index_.next_pages(std::max(next_spares_, kLeastSpares));
-  if (can_do([&] { grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end())); })) return;
+  if (has_memory_for([&] { grow(1 + *std::max_element(spare_pages_.begin(), spare_pages_.end())); })) return;
   std::size_t room = std::min({surfels_.size() / PAGE_SLOTS, alive_.size(), changed_.size(), page_block_.size()});
   if (reserves_ids_) room = std::min(room, reserved_.size());
   const auto beyond = std::find_if(spare_pages_.begin(), spare_pages_.end(), [&](Page page) { return page >= room; });

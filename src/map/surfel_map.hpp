@@ -205,7 +205,7 @@ class SurfelMap {
   const cl::Buffer& reserved() const { return reserves_ids_ ? reserved_() : alive_(); }   ///< no new surfel may take these slots
   std::uint32_t removal(std::uint32_t frame) const { return reserves_ids_ ? frame : 0; }  ///< for index_: pages removed in a frame
   void make_room_to_keep(std::size_t surfels);
-  static bool can_do(const std::function<void()>& allocate);
+  static bool has_memory_for(const std::function<void()>& allocate);
   void sort(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   void sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving);
   Surfel to_surfel(const cl_uint4& packed, const cl_int4& block, std::uint32_t slot) const;

@@ -40,7 +40,7 @@ bool SurfelMap::sort_early(const char* stage, const NewCells& cells, const Devic
 
 bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
   if (spare_pages_.empty() || missing_told_ == nullptr || undo_.kept_pages > 0) return false;
-  if (!can_do([&] { make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept)); })) return false;
+  if (!has_memory_for([&] { make_room_to_keep(undo_.most_kept + std::max(next_kept_, kLeastKept)); })) return false;
   const auto room = static_cast<cl_uint>(undo_.room - undo_.most_kept), spare = static_cast<cl_uint>(spare_pages_.size());
   const cl::Buffer& evidence = doubts.evidence != nullptr ? *doubts.evidence : doubts.listed;  // a kernel takes no missing buffer
   commands_.run(stage, "decide_to_go_on", 1, 1, evidence, static_cast<cl_int>(doubts.evidence != nullptr), doubts.listed, doubts.chosen,
@@ -52,7 +52,7 @@ bool SurfelMap::go_ahead(const char* stage, const Doubts& doubts) {
 }
 
 /// Too little memory for what a frame may not need is no fault.
-bool SurfelMap::can_do(const std::function<void()>& allocate) {
+bool SurfelMap::has_memory_for(const std::function<void()>& allocate) {
   try {
     allocate();
   } catch (const Error&) {

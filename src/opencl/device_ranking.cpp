@@ -42,7 +42,7 @@ std::string advantage(const DeviceFacts& device, const DeviceFacts& next) {
   return speed(device) > speed(next) ? "the most compute units x clock" : "the first of equals";
 }
 
-std::string mib(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+std::string whole_mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
 
 /// @param fitting  those that fit, in ranking order
 std::string reason(const std::vector<DeviceFacts>& devices, const std::vector<std::size_t>& fitting, const Config& config) {
@@ -115,8 +115,8 @@ std::string listing(const std::vector<DeviceFacts>& devices, const Config& confi
     const auto line = [&](std::string name, const std::string& value) { text += "  " + name.append(16 - name.size(), ' ') + value + "\n"; };
     line("type", device.type);
     line("compute units", std::to_string(device.compute_units) + " at " + std::to_string(device.clock_mhz) + " MHz");
-    line("global memory", mib(device.global_bytes));
-    line("largest buffer", mib(device.largest_buffer_bytes));
+    line("global memory", whole_mebibytes(device.global_bytes));
+    line("largest buffer", whole_mebibytes(device.largest_buffer_bytes));
     line("local memory", std::to_string(device.local_bytes >> 10) + " KiB");
     line("driver", device.driver);
     line("OpenCL", device.version);

@@ -148,18 +148,16 @@ void TakingBack::find_evidence(const Frame& frame, const Camera& camera, const R
   older_count_ = static_cast<cl_int>(older.size());
   older_views_.send(std::move(older));
 
-  weigh("weigh_coarsely", commands_.chunks(coarse), frame, camera, views, seen, coarse_());
-  weigh("weigh_evidence", commands_.chunks(frame.grid.width) * rows, frame, camera, views, seen, coarse_(), evidence_());
+  const auto weigh = [&](std::size_t chunks, int step, const DeviceArray<cl_uchar>& evidence) {
+    commands_.run(kStage, "weigh_evidence", chunks * commands_.shape().view_team, commands_.shape().heavy_group, frame, limits_,
+                  camera.depth()(), frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_,
+                  views.depths(), seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(),
+                  static_cast<cl_int>(step), coarse_(), evidence());
+  };
+  weigh(commands_.chunks(coarse), TAKE_SQUARE, coarse_);
+  weigh(commands_.chunks(frame.grid.width) * rows, 1, evidence_);
   commands_.run(kStage, "find_squares", pixels, kGroup, frame, evidence_(), squares_());
   commands_.run(kStage, "choose_pixels", pixels, kGroup, frame, evidence_(), squares_(), chosen_(), chosen_count_());
-}
-
-template <typename... Images>
-void TakingBack::weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
-                       const SeenPoints& seen, const Images&... images) {
-  commands_.run(kStage, kernel, items * commands_.shape().view_team, commands_.shape().heavy_group, frame, limits_, camera.depth()(),
-                frame_views_(), static_cast<cl_int>(last_frames_.size()), images_(), older_views_(), older_count_, views.depths(),
-                seen.slots(), seen.tables(), seen.brick_words(), taken_.slots(), taken_.tables(), taken_.brick_words(), images...);
 }
 
 /// May this frame see something of a cube? @param center  camera frame [m]; radius: of the sphere around the cube [m]

@@ -102,9 +102,6 @@ class TakingBack {
   void change_bricks(const Frame& frame, const Camera& camera, const RecentViews& views, const MapWindow& window, bool has_chosen,
                      std::vector<Brick> bricks);
   void settle_bricks();
-  template <typename... Images>
-  void weigh(const char* kernel, std::size_t items, const Frame& frame, const Camera& camera, const RecentViews& views,
-             const SeenPoints& seen, const Images&... images);
 
   Commands& commands_;
   const TakeBackLimits limits_;
