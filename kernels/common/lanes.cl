@@ -44,6 +44,7 @@
 #define PREFETCH(address) prefetch((__global const uint16*)(address), 1)
 #endif
 
+// The mark of a comparison of single numbers, at any width.
 #define MARK_OF_ONE(condition) (-(1 & (condition)))
 #if LANES == 16
 #define OF_LANES(name) name##16
