@@ -123,6 +123,16 @@ TEST(WorkShape, Teams) {
   EXPECT_EQ(shape.team(1 << 30), 1U);
 }
 
+/// Fewer chunks where each has more counts, but enough to keep a device busy.
+TEST(WorkShape, SortChunks) {
+  WorkShape shape;
+  shape.most_sort_chunks = 512;
+  EXPECT_EQ(shape.sort_chunks(0), 512U);
+  EXPECT_EQ(shape.sort_chunks(256), 512U);
+  EXPECT_EQ(shape.sort_chunks(1 << 10), 128U);
+  EXPECT_EQ(shape.sort_chunks(200000), 16U);
+}
+
 /// Each program has all that its kernels call.
 TEST(StageKernelPrograms, AreBuiltByThemselves) {
   const Device& device = test_commands().device();

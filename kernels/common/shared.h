@@ -46,6 +46,9 @@ namespace frontier_surfels {
 // Number of work items in the groups that go through the pages in view. A group has one or several pages.
 #define PAGE_GROUP 64
 
+// Number of work items in the groups that sort new surfels.
+#define SORT_GROUP 64
+
 // Kept views ----------------------------------------------------------------------------------------------------------------------------
 
 // Maximum number of kept views.

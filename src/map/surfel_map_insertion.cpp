@@ -125,11 +125,11 @@ void SurfelMap::sort(const char* stage, const NewCells& cells, const DeviceArray
 
 void SurfelMap::sort_by_cell(const char* stage, const NewCells& cells, const DeviceArray<cl_ulong>& leaving) {
   const auto cell_count = static_cast<cl_uint>(window_.cells()), pages = static_cast<cl_uint>(window_pages());
-  const std::size_t bins = commands_.shape().sort_chunks * cell_count, group = commands_.shape().sort_group;
-  const auto chunks = static_cast<cl_uint>(commands_.shape().sort_chunks);
+  const auto chunks = static_cast<cl_uint>(commands_.shape().sort_chunks(cell_count));
+  const std::size_t bins = std::size_t{chunks} * cell_count, group = commands_.shape().sort_group;
   histogram_.resize(bins + 1);
   histogram_.fill(stage, 0, bins);
-  commands_.run(stage, "count_cells", chunks, group, cells.cells(), cells.length, chunks, histogram_());
+  commands_.run(stage, "count_cells", chunks * group, group, cells.cells(), cells.length, chunks, histogram_());
   lists_.prefix_sums(stage, histogram_, bins);
   if (pages == 0) free_before_.fill(stage, 0, 1);
   commands_.run(stage, "count_free", pages, kGroup, pages_list_(), pages, leaving(), alive_(), static_cast<cl_int>(reserves_ids_),
@@ -138,7 +138,7 @@ void SurfelMap::sort_by_cell(const char* stage, const NewCells& cells, const Dev
   commands_.run(stage, "begin_cells", cell_count + 1, kGroup, histogram_(), cell_pages_list_(), free_before_(), cell_count, chunks,
                 cell_begin_(), missing_before_());
   lists_.prefix_sums(stage, missing_before_, cell_count);
-  commands_.run(stage, "sort_by_cell", chunks, group, cells.cells(), cells.length, chunks, histogram_(), order_());
+  commands_.run(stage, "sort_by_cell", chunks * group, group, cells.cells(), cells.length, chunks, histogram_(), order_());
 }
 
 void SurfelMap::finish_frame(const char* stage, std::uint32_t frame) {

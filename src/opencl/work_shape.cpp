@@ -13,6 +13,11 @@ std::size_t WorkShape::team(std::size_t jobs) const {
   return team;
 }
 
+std::size_t WorkShape::sort_chunks(std::size_t blocks) const {
+  constexpr std::size_t kCounts = 1 << 17, kLeast = 16;  // summing up the counts must not take longer than sorting
+  return std::clamp(kCounts / std::max<std::size_t>(blocks, 1), kLeast, most_sort_chunks);
+}
+
 WorkShape shape_for(const Device& device) {
   WorkShape shape;
   shape.is_near = device.is_cpu && device.lanes != 1;
@@ -26,8 +31,8 @@ WorkShape shape_for(const Device& device) {
     shape.scan_by_group = 1 << 14;
     shape.scan_group = std::min<std::size_t>(MOST_SCAN_ITEMS, device.device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>());
     shape.list_chunk = 4;
-    shape.sort_chunks = 512;
-    shape.sort_group = 64;
+    shape.sort_group = SORT_GROUP;
+    shape.most_sort_chunks = 512;
   } else if (device.is_pocl_cpu) {
     shape.scan_alone = 1 << 16;
     shape.list_alone = 1 << 18;

@@ -27,12 +27,15 @@ struct WorkShape {
   std::size_t list_alone = 0;     ///< the bits of so many words are listed by one work item
   std::size_t list_chunk = 16;    ///< otherwise each of many lists those of so many words
   std::size_t sort_alone = 0;     ///< if about so many new surfels are expected, one work item sorts them; 0: never
-  std::size_t sort_chunks = 64;   ///< otherwise so many work items sort them by block, each its share
-  std::size_t sort_group = 1;     ///< in groups of so many
-  std::size_t view_items = 64;    ///< work items that draw planners' views at a time
+  std::size_t sort_group = 1;     ///< otherwise groups of so many work items sort them by block, each group a chunk
+  std::size_t most_sort_chunks = 64;
+  std::size_t view_items = 64;  ///< work items that draw planners' views at a time
 
   /// Work items that have each of so many jobs together: fewer where the jobs alone keep the device busy. A power of two.
   std::size_t team(std::size_t jobs) const;
+
+  /// Chunks in which new surfels are sorted by so many blocks. Each has a count for each block.
+  std::size_t sort_chunks(std::size_t blocks) const;
 };
 
 WorkShape shape_for(const Device& device);
