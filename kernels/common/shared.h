@@ -24,7 +24,7 @@ namespace frontier_surfels {
 #define VIEW_TILE_K 16
 #define WORD_TILES (64 / VIEW_TILE_K)
 
-// Rows of the grid that one work item observes. On a device that wants many work items each has half a word of one column.
+// Rows of the grid that one work item observes. At width 1 a work-group has one row.
 #define SPACE_ROWS 8
 
 // The tables of a camera have rows of voxels that are filled up to whole chunks of this size.

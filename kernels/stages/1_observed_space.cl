@@ -37,22 +37,13 @@ INLINE uintv pixel_bits(uintv range, int first) {
 
 // The cuboid's share of 32 layers of LANES x `row_count` columns: a voxel is observed iff there is a valid pixel in a fixed rectangle of
 // the image. Valid pixels of a rectangle's rows are joined, a bit for each column of pixels, for all voxels of a row of the grid at once.
-// At width 1 there is one column, and nobody looks on behind the first valid pixel: rectangles of near layers are as large as the image.
 //   i, j: the first of the columns;   i/o observed[row_count]: bits of the layers
+#if LANES > 1
 INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global const uint* pixels_i, __global const ushort2* pixels_j,
                            __global const ushort2* words_i, int i, int j, int row_count, int first_layer, uintv* observed) {
   const int chunks_i = (g->size_i + TABLE_CHUNK - 1) / TABLE_CHUNK, chunks_j = (g->size_j + TABLE_CHUNK - 1) / TABLE_CHUNK;
   for (int k = first_layer; k < first_layer + 32; ++k) {
     const ushort2 words = words_i[k * chunks_i + i / TABLE_CHUNK];
-#if LANES == 1
-    const ushort2 rows = pixels_j[k * chunks_j * TABLE_CHUNK + j];
-    bool found = false;
-    for (int word = words.x; word < words.y && !found; ++word) {
-      const uint columns = pixel_bits(pixels_i[k * chunks_i * TABLE_CHUNK + i], 32 * word);
-      for (int row = rows.x; columns != 0 && row < rows.y && !found; ++row) found = (columns & valid[row * image_words(g) + word]) != 0;
-    }
-    if (found) *observed |= 1u << (k % 32);
-#else
     for (int word = words.x; word < words.y; ++word) {
       const uintv columns = pixel_bits(vloadv(0, pixels_i + k * chunks_i * TABLE_CHUNK + i), 32 * word);
       if (!any_lane(MARK(columns != 0u))) continue;
@@ -63,9 +54,48 @@ INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global c
         observed[n] |= (columns & joined) != 0u ? (uintv)(1u << (k % 32)) : (uintv)(0);
       }
     }
-#endif
   }
 }
+#else
+// At width 1 a work-group has a row of the grid. Its work items join the rows of pixels, each for some layers and words, and then look at
+// some columns of the grid each.
+//   first_word, count: of an image row's words
+//   out joined[32][JOINED_WORDS + 1]: for each layer; what is behind the words is not looked at
+#define JOINED_WORDS 32  // of an image's row, at a time
+INLINE void join_rows(const Grid* g, __global const uint* valid, __global const ushort2* pixels_j, int j, int first_layer, int first_word,
+                      int count, __local uint (*joined)[JOINED_WORDS + 1]) {
+  const int chunks_j = (g->size_j + TABLE_CHUNK - 1) / TABLE_CHUNK;
+  // Neighbours have the same word: near layers have all rows, and a few are enough but for words at the border that have no valid column.
+  for (int n = get_local_id(0); n < 32 * count; n += get_local_size(0)) {
+    const int layer = n % 32, word = n / 32;
+    const ushort2 rows = pixels_j[(first_layer + layer) * chunks_j * TABLE_CHUNK + j];
+    uint found = 0;
+    for (int row = rows.x; row < rows.y && found != UINT_MAX; ++row) found |= valid[row * image_words(g) + first_word + word];
+    joined[layer][word] = found;
+  }
+}
+
+INLINE uint observe_cuboid(const Grid* g, __local const uint (*joined)[JOINED_WORDS + 1], __global const uint* pixels_i, int i,
+                           int first_layer, int first_word, int count) {
+  const int chunks_i = (g->size_i + TABLE_CHUNK - 1) / TABLE_CHUNK;
+  uint observed = 0;
+  for (int layer = 0; layer < 32; ++layer) {
+    const uint range = pixels_i[(first_layer + layer) * chunks_i * TABLE_CHUNK + i];
+    const int from = (int)(range & 0xffffu) - 32 * first_word, to = (int)(range >> 16) - 32 * first_word;
+    uint found = 0;
+    if (from >= 0 && from < to && to - from < 32 && to <= 32 * count) {
+      const ulong words = (ulong)joined[layer][from / 32 + 1] << 32 | joined[layer][from / 32];
+      found = (uint)(words >> (from % 32)) & ((1u << (to - from)) - 1);
+    } else {
+      const int end = min((to + 31) / 32, count);
+      for (int word = max(from / 32, 0); word < end && found == 0; ++word)
+        found = pixel_bits(range, 32 * (first_word + word)) & joined[layer][word];
+    }
+    observed |= found != 0 ? 1u << layer : 0;
+  }
+  return observed;
+}
+#endif
 
 // The pyramid's share of 32 layers: a run up to the end of each column.
 INLINE uintv observe_pyramid(const Grid* g, intv column_end, int first_layer) {
@@ -82,25 +112,33 @@ INLINE intv ends_of_columns(const Grid* g, __global const int* column_end, int i
 }
 
 // One work item handles LANES x SPACE_ROWS columns and a word of their layers; work item (row * words_k + w) * chunks_of(size_i) + chunk
-// has the columns from (LANES chunk, SPACE_ROWS row). At width 1 it handles half a word of a column; work item (j 2 words_k + half) size_i
-// + i.
+// has the columns from (LANES chunk, SPACE_ROWS row). At width 1 work-group 2 words_k j + half has half a word of all columns of row j.
 //   in  column_end, valid: of column_ends
 //       pixels_i[layers][chunks][TABLE_CHUNK], pixels_j[layers][chunks][TABLE_CHUNK]: for each voxel along i, along j,
 //         first and one past the last column, row of pixels whose samples lie there, as 16-bit halves
-//       words_i[layers][chunks]: for each chunk of pixels_i, first and one past the last word of 32 pixels that its columns lie in
+//       words_i[layers][chunks]: for each chunk of pixels_i, first and one past the last word of 32 pixels that its columns lie in; for
+//         width 1 there is no need of it
 //       These tables have the cuboid's layers, filled up to whole words, and voxels filled up to whole chunks of TABLE_CHUNK.
 //   out observed: bit field
 #if LANES == 1
 __kernel void observed_space(const Grid g, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,
                              __global const ushort2* pixels_j, __global const ushort2* words_i, __global ulong* observed) {
-  const int parts = 2 * g.words_k, i = get_global_id(0) % g.size_i, part = get_global_id(0) / g.size_i % parts,
-            j = get_global_id(0) / g.size_i / parts;
-  if (j >= g.size_j) return;
-  uint bits = 0;
-  if (32 * part < g.first_pyramid_layer) observe_cuboid(&g, valid, pixels_i, pixels_j, words_i, i, j, 1, 32 * part, &bits);
-  bits |= observe_pyramid(&g, ends_of_columns(&g, column_end, i, j), 32 * part);
-  bits &= (uint)(valid_layers(&g, part / 2) >> (32 * (part % 2)));
-  ((__global uint*)observed)[2 * word_index(&g, i, j, part / 2) + part % 2] = bits;
+  __local uint joined[32][JOINED_WORDS + 1];
+  const int parts = 2 * g.words_k, part = get_group_id(0) % parts, j = get_group_id(0) / parts, item = get_local_id(0),
+            items = get_local_size(0), words = 32 * part < g.first_pyramid_layer ? image_words(&g) : 0;
+  const uint layers = (uint)(valid_layers(&g, part / 2) >> (32 * (part % 2)));
+  __global uint* row = (__global uint*)(observed + word_index(&g, 0, j, part / 2)) + part % 2;
+  for (int first_word = 0; first_word == 0 || first_word < words; first_word += JOINED_WORDS) {
+    const int count = min(words - first_word, JOINED_WORDS);
+    join_rows(&g, valid, pixels_j, j, 32 * part, first_word, count, joined);
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+    for (int i = item; i < g.size_i; i += items) {
+      uint bits = first_word > 0 ? row[2 * i] : observe_pyramid(&g, ends_of_columns(&g, column_end, i, j), 32 * part);
+      if (count > 0) bits |= observe_cuboid(&g, joined, pixels_i, i, 32 * part, first_word, count);
+      row[2 * i] = bits & layers;
+    }
+    GROUP_BARRIER(CLK_LOCAL_MEM_FENCE);
+  }
 }
 #else
 __kernel void observed_space(const Grid g, __global const int* column_end, __global const uint* valid, __global const uint* pixels_i,

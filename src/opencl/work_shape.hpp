@@ -18,7 +18,7 @@ struct WorkShape {
                                 ///< out what it has found before the host knows of it
   bool many_items = false;      ///< as a graphics processor likes it; chosen where a work item has one lane
   std::size_t heavy_group = 1;  ///< group size for kernels with much work per item
-  std::size_t tile_group = 1;   ///< and of settle_candidates, with its many barriers
+  std::size_t tile_group = 1;   ///< and for kernels whose work items have a job together, with many barriers
   std::size_t view_team = 1;  ///< at most so many work items have a pixel, a candidate or a surfel together, where it mostly waits for the
                               ///< images of kept views
   std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
