@@ -123,14 +123,16 @@ TEST(WorkShape, Teams) {
   EXPECT_EQ(shape.team(1 << 30), 1U);
 }
 
-/// Fewer chunks where each has more counts, but enough to keep a device busy.
+/// Fewer chunks where each has more counts, if many work items share a chunk.
 TEST(WorkShape, SortChunks) {
   WorkShape shape;
   shape.most_sort_chunks = 512;
+  for (const std::size_t blocks : {0, 256, 1 << 10, 200000}) EXPECT_EQ(shape.sort_chunks(blocks), 512U);
+  shape.many_items = true;
   EXPECT_EQ(shape.sort_chunks(0), 512U);
   EXPECT_EQ(shape.sort_chunks(256), 512U);
   EXPECT_EQ(shape.sort_chunks(1 << 10), 128U);
-  EXPECT_EQ(shape.sort_chunks(200000), 16U);
+  EXPECT_EQ(shape.sort_chunks(200000), 32U);
 }
 
 /// Each program has all that its kernels call.

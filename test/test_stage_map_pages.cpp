@@ -139,7 +139,7 @@ TEST(StageMapPages, ManyPages) {
   pages.open_window(4);
   pages.insert(small_tests() ? 2000 : 30000, 60);
   EXPECT_LT(pages.book().pages.size(), kRoom);
-  pages.insert(small_tests() ? 2000 : 50000, 60);
+  pages.insert(small_tests() ? 2500 : 50000, 60);
   EXPECT_TRUE(small_tests() || pages.book().pages.size() > kRoom) << pages.book().pages.size();
   pages.expect_as_in_book();
 }

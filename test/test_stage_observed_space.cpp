@@ -57,15 +57,18 @@ TEST(StageObservedSpace, OneValidPixelAtATime) {
   }
 }
 
-/// Rows of pixels with more words than a work-group has at a time.
+/// Rows of pixels with several words, and with more than a work-group has at a time.
 TEST(StageObservedSpace, WideImages) {
-  const CameraSetup camera = make_camera(1100, 2, 40.3, 40.1, 65);
-  Random random(4);
-  check(camera, random_image(camera, Content::mixed, random));
-  for (int n = 0; n < (small_tests() ? 1 : 20); ++n) {
-    WorkingImage image = random_image(camera, Content::all_invalid, random);
-    for (int valid = 0; valid < 10; ++valid) image.depth[random.whole(0, static_cast<int>(image.depth.size()) - 1)] = 0.9F;
-    check(camera, image);
+  for (const int width : {100, 1100}) {
+    const CameraSetup camera = make_camera(width, 2, 40.3, 40.1, 65);
+    SCOPED_TRACE(camera.name);
+    Random random(4);
+    check(camera, random_image(camera, Content::mixed, random));
+    for (int n = 0; n < (small_tests() ? 1 : 20); ++n) {
+      WorkingImage image = random_image(camera, Content::all_invalid, random);
+      for (int valid = 0; valid < 10; ++valid) image.depth[random.whole(0, static_cast<int>(image.depth.size()) - 1)] = 0.9F;
+      check(camera, image);
+    }
   }
 }
 

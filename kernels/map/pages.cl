@@ -16,21 +16,38 @@ __kernel void to_slots(__global const uint* pages, __global uint* list, const ui
 
 INLINE uint chunk_begin(uint count, uint chunk, uint chunks) { return (uint)((ulong)count * chunk / chunks); }
 
+// One work item handles a chunk of the new surfels; at width 1 a work-group has a chunk.
+//   in  new_cells[length[0]];   i/o histogram[cells][chunks]: before: 0; after: how many of each chunk go to each cell
+__kernel void count_cells(__global const uint* new_cells, __global const uint* length, const uint chunks, __global uint* histogram) {
+  const uint count = length[0];
 #if LANES == 1
-// Where a new surfel stands among SORT_GROUP neighbours of the list, a round: one work item of a group handles one of them.
+  const uint chunk = get_group_id(0), end = chunk_begin(count, chunk + 1, chunks);
+  for (uint n = chunk_begin(count, chunk, chunks) + get_local_id(0); n < end; n += SORT_GROUP)
+    atomic_inc(&histogram[chunks * new_cells[n] + chunk]);
+#else
+  const uint chunk = get_global_id(0);
+  if (chunk >= chunks) return;
+  for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
+    ++histogram[chunks * new_cells[n] + chunk];
+#endif
+}
+
+#if LANES == 1
+// Where a new surfel stands among SORT_GROUP neighbours of the list, a round: a work-group handles them together.
 typedef struct {
   uint cell;     // where it goes
   uint before;   // how many of the round that come before it go there, too
-  bool exists;   // the last round may be shorter
+  bool exists;   // false behind the end of the chunk
   bool is_last;  // none of those after it goes there
 } PlaceInRound;
 
-// All work items of the group call it for the round that begins at surfel `first` of the list; `cells` is read until the next barrier.
+// All work items of the group call it for the round that begins at surfel `first` of the list. What they have read and written before is
+// done then.
 INLINE PlaceInRound place_in_round(__global const uint* new_cells, uint first, uint end, __local uint* cells) {
   const uint item = get_local_id(0), size = min((uint)SORT_GROUP, end - first);
   PlaceInRound place = {item < size ? new_cells[first + item] : 0, 0, item < size, item < size};
   cells[item] = place.cell;
-  barrier(CLK_LOCAL_MEM_FENCE);
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   for (uint n = 0; n < size; ++n) {
     const bool same = cells[n] == place.cell;
     place.before += same && n < item ? 1 : 0;
@@ -41,42 +58,23 @@ INLINE PlaceInRound place_in_round(__global const uint* new_cells, uint first, u
 #endif
 
 // One work item handles a chunk of the new surfels; at width 1 a work-group has a chunk, and its work items the surfels of a round.
-//   in  new_cells[length[0]];   i/o histogram[cells][chunks]: before: 0; after: how many of each chunk go to each cell
-__kernel void count_cells(__global const uint* new_cells, __global const uint* length, const uint chunks, __global uint* histogram) {
-#if LANES == 1
-  __local uint cells[SORT_GROUP];
-  const uint chunk = get_group_id(0), end = chunk_begin(length[0], chunk + 1, chunks);
-  for (uint first = chunk_begin(length[0], chunk, chunks); first < end; first += SORT_GROUP) {
-    const PlaceInRound place = place_in_round(new_cells, first, end, cells);
-    if (place.is_last) histogram[chunks * place.cell + chunk] += place.before + 1;
-    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-  }
-#else
-  const uint chunk = get_global_id(0), count = length[0];
-  if (chunk >= chunks) return;
-  for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
-    ++histogram[chunks * new_cells[n] + chunk];
-#endif
-}
-
-// One work item handles a chunk of the new surfels; at width 1 as in count_cells.
 //   in  new_cells[length[0]];   i/o histogram: before: its prefix sum; after: where each chunk's share of each cell ends
 //   out order[length[0]]: new surfels sorted by cell
 __kernel void sort_by_cell(__global const uint* new_cells, __global const uint* length, const uint chunks, __global uint* histogram,
                            __global uint* order) {
+  const uint count = length[0];
 #if LANES == 1
   __local uint cells[SORT_GROUP];
-  const uint chunk = get_group_id(0), end = chunk_begin(length[0], chunk + 1, chunks);
-  for (uint first = chunk_begin(length[0], chunk, chunks); first < end; first += SORT_GROUP) {
+  const uint chunk = get_group_id(0), end = chunk_begin(count, chunk + 1, chunks);
+  for (uint first = chunk_begin(count, chunk, chunks); first < end; first += SORT_GROUP) {
     const PlaceInRound place = place_in_round(new_cells, first, end, cells);
     const uint bin = chunks * place.cell + chunk, at = histogram[bin] + place.before;
     if (place.exists) order[at] = first + get_local_id(0);
-    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);  // all have read the histogram
+    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);  // all have read the histogram and the cells
     if (place.is_last) histogram[bin] = at + 1;
-    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   }
 #else
-  const uint chunk = get_global_id(0), count = length[0];
+  const uint chunk = get_global_id(0);
   if (chunk >= chunks) return;
   for (uint n = chunk_begin(count, chunk, chunks); n < chunk_begin(count, chunk + 1, chunks); ++n)
     order[histogram[chunks * new_cells[n] + chunk]++] = n;

@@ -60,23 +60,24 @@ INLINE void observe_cuboid(const Grid* g, __global const uint* valid, __global c
 // At width 1 a work-group has a row of the grid. Its work items join the rows of pixels, each for some layers and words, and then look at
 // some columns of the grid each.
 //   first_word, count: of an image row's words
-//   out joined[32][JOINED_WORDS + 1]: for each layer; what is behind the words is not looked at
+//   out joined[32][JOINED_WORDS + 1]: for each layer; observe_cuboid reads one word more, but does not use its bits
 #define JOINED_WORDS 32  // of an image's row, at a time
 INLINE void join_rows(const Grid* g, __global const uint* valid, __global const ushort2* pixels_j, int j, int first_layer, int first_word,
                       int count, __local uint (*joined)[JOINED_WORDS + 1]) {
   const int chunks_j = (g->size_j + TABLE_CHUNK - 1) / TABLE_CHUNK;
-  // Neighbours have the same word: near layers have all rows, and a few are enough but for words at the border that have no valid column.
+  // Neighbours have one word of different layers. Where most pixels are valid, a few of many rows fill it.
   for (int n = get_local_id(0); n < 32 * count; n += get_local_size(0)) {
     const int layer = n % 32, word = n / 32;
     const ushort2 rows = pixels_j[(first_layer + layer) * chunks_j * TABLE_CHUNK + j];
-    uint found = 0;
+    const int columns = g->width - 32 * (first_word + word);
+    uint found = columns < 32 ? UINT_MAX << columns : 0;  // nobody asks for columns behind the image
     for (int row = rows.x; row < rows.y && found != UINT_MAX; ++row) found |= valid[row * image_words(g) + first_word + word];
     joined[layer][word] = found;
   }
 }
 
-INLINE uint observe_cuboid(const Grid* g, __local const uint (*joined)[JOINED_WORDS + 1], __global const uint* pixels_i, int i,
-                           int first_layer, int first_word, int count) {
+INLINE uint observe_cuboid(const Grid* g, __local uint (*joined)[JOINED_WORDS + 1], __global const uint* pixels_i, int i, int first_layer,
+                           int first_word, int count) {
   const int chunks_i = (g->size_i + TABLE_CHUNK - 1) / TABLE_CHUNK;
   uint observed = 0;
   for (int layer = 0; layer < 32; ++layer) {
@@ -128,6 +129,7 @@ __kernel void observed_space(const Grid g, __global const int* column_end, __glo
             items = get_local_size(0), words = 32 * part < g.first_pyramid_layer ? image_words(&g) : 0;
   const uint layers = (uint)(valid_layers(&g, part / 2) >> (32 * (part % 2)));
   __global uint* row = (__global uint*)(observed + word_index(&g, 0, j, part / 2)) + part % 2;
+  // Once at least, for the pyramid.
   for (int first_word = 0; first_word == 0 || first_word < words; first_word += JOINED_WORDS) {
     const int count = min(words - first_word, JOINED_WORDS);
     join_rows(&g, valid, pixels_j, j, 32 * part, first_word, count, joined);

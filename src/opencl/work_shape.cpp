@@ -14,8 +14,8 @@ std::size_t WorkShape::team(std::size_t jobs) const {
 }
 
 std::size_t WorkShape::sort_chunks(std::size_t blocks) const {
-  constexpr std::size_t kCounts = 1 << 17, kLeast = 16;  // summing up the counts must not take longer than sorting
-  return std::clamp(kCounts / std::max<std::size_t>(blocks, 1), kLeast, most_sort_chunks);
+  constexpr std::size_t kCounts = 1 << 17, kLeast = 32;  // summing up the counts must not take longer than sorting
+  return many_items ? std::clamp(kCounts / std::max<std::size_t>(blocks, 1), kLeast, most_sort_chunks) : most_sort_chunks;
 }
 
 WorkShape shape_for(const Device& device) {

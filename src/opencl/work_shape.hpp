@@ -21,20 +21,20 @@ struct WorkShape {
   std::size_t tile_group = 1;   ///< and for kernels whose work items have a job together, with many barriers
   std::size_t view_team = 1;  ///< at most so many work items have a pixel, a candidate or a surfel together, where it mostly waits for the
                               ///< images of kept views
-  std::size_t scan_alone = 2048;  ///< so many values are summed up by one work item
-  std::size_t scan_by_group = 0;  ///< so many by one work-group
-  std::size_t scan_group = 1;     ///< work items of this group
-  std::size_t list_alone = 0;     ///< the bits of so many words are listed by one work item
-  std::size_t list_chunk = 16;    ///< otherwise each of many lists those of so many words
-  std::size_t sort_alone = 0;     ///< if about so many new surfels are expected, one work item sorts them; 0: never
-  std::size_t sort_group = 1;     ///< otherwise groups of so many work items sort them by block, each group a chunk
-  std::size_t most_sort_chunks = 64;
-  std::size_t view_items = 64;  ///< work items that draw planners' views at a time
+  std::size_t scan_alone = 2048;      ///< so many values are summed up by one work item
+  std::size_t scan_by_group = 0;      ///< so many by one work-group
+  std::size_t scan_group = 1;         ///< work items of this group
+  std::size_t list_alone = 0;         ///< the bits of so many words are listed by one work item
+  std::size_t list_chunk = 16;        ///< otherwise each of many lists those of so many words
+  std::size_t sort_alone = 0;         ///< if about so many new surfels are expected, one work item sorts them; 0: never
+  std::size_t sort_group = 1;         ///< otherwise groups of so many work items sort them by block, each group a chunk
+  std::size_t most_sort_chunks = 64;  ///< of so many
+  std::size_t view_items = 64;        ///< work items that draw planners' views at a time
 
   /// Work items that have each of so many jobs together: fewer where the jobs alone keep the device busy. A power of two.
   std::size_t team(std::size_t jobs) const;
 
-  /// Chunks in which new surfels are sorted by so many blocks. Each has a count for each block.
+  /// Chunks in which new surfels are sorted by so many blocks. Each has a count for each block: fewer where it has many work items.
   std::size_t sort_chunks(std::size_t blocks) const;
 };
 
