@@ -103,6 +103,29 @@ TEST_F(SeenPointsTest, ForEveryDistanceOfThePoints) {
   }
 }
 
+TEST_F(SeenPointsTest, BricksWithPointsAreThoseOfTheTables) {
+  const double block_size = FrameFixture(camera_.config).map().block_size();
+  for (const int bricks_along : {1, 2, 4, 8, 16}) {
+    SCOPED_TRACE(bricks_along);
+    views_.clear();
+    remember(cameras().front(), 1, block_size / (SEEN_BRICK * bricks_along), Content::mixed, true);
+    SeenPoints& seen = fixture_->seen();
+    ASSERT_EQ(1 << seen.shift(), bricks_along);
+    seen.drop_block(seen.blocks().front());
+    std::vector<BlockKey> blocks;
+    for (const BlockKey& block : seen.blocks()) {
+      std::vector<int> expected;
+      for (int brick = 0; brick < seen.bricks_of_block(); ++brick)
+        if (seen.entry(seen.table(block), brick) != SEEN_BRICK_EMPTY) expected.push_back(brick);
+      EXPECT_EQ(seen.bricks_with_points(seen.table(block)), expected);
+      EXPECT_EQ(seen.has_points(seen.table(block)), !expected.empty());
+      if (!expected.empty()) blocks.push_back(block);
+    }
+    EXPECT_FALSE(blocks.empty());
+    EXPECT_EQ(seen.blocks_with_points(), blocks);
+  }
+}
+
 TEST_F(SeenPointsTest, AnEmptyViewIsNotRemembered) {
   remember(cameras().front(), 1, 0.02, Content::all_invalid, false);
   EXPECT_FALSE(fixture_->views().forgotten());

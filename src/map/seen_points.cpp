@@ -2,48 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "config/config_text.hpp"
 #include "frontier_surfels/types.hpp"
-#include "map/seen_block.hpp"
+#include "map/bits.hpp"
 #include "map/seen_box.hpp"
 
 namespace frontier_surfels {
 namespace {
 
-constexpr int kMostShift = 4;  // 16 bricks, hence 256 points, along a block's edge: a block's table takes 16 kB
-constexpr std::size_t kGroup = 64;
+std::size_t words_for(std::size_t bits) { return (bits + 63) / 64; }
+
 }  // namespace
-
-void SeenPoints::check(const SeenSpace& seen) {
-  int shift = 0;
-  while (shift < kMostShift && SEEN_BRICK << shift < seen.points) ++shift;
-  if (seen.points != SEEN_BRICK << shift)
-    throw FileError("What has been seen has " + std::to_string(seen.points) +
-                    " points along a block's edge, which is no power of two from 16 to 256: use another copy of the map.");
-  for (const SeenSpace::Block& block : seen.blocks) check_seen_block(block.bytes, std::size_t{1} << (3 * shift));
-}
-
-void SeenPoints::load(const SeenSpace& seen) {
-  check(seen);
-  choose_shift(static_cast<int>(std::lround(std::log2(seen.points / SEEN_BRICK))));
-  fixed_ = false;  // if nothing was seen, the next frame may choose another one
-  std::vector<SeenBlock> blocks;
-  for (const SeenSpace::Block& block : seen.blocks) blocks.push_back({{block.block[0], block.block[1], block.block[2]}, block.bytes});
-  add_blocks(blocks);
-}
-
-SeenSpace SeenPoints::saved() {
-  SeenSpace seen;
-  seen.block_size = block_size_;
-  seen.points = SEEN_BRICK << shift_;
-  const std::vector<BlockKey> blocks = blocks_with_points();
-  std::vector<std::vector<std::uint8_t>> bytes = read_blocks(blocks);
-  for (std::size_t n = 0; n < blocks.size(); ++n) seen.blocks.push_back({{blocks[n].x, blocks[n].y, blocks[n].z}, std::move(bytes[n])});
-  return seen;
-}
 
 SeenPoints::SeenPoints(Commands& commands, double block_size)
     : commands_(commands),
@@ -71,6 +42,8 @@ void SeenPoints::clear() {
   free_.clear();
   used_ = 2;
   changed_places_.clear();
+  is_changed_.assign(tables_.size(), false);
+  not_empty_.assign(words_for(tables_.size()), 0);
   new_bricks_.clear();
   sent_tables_ = 0;
 }
@@ -115,6 +88,8 @@ int SeenPoints::table(const BlockKey& block) {
   if (free_tables_.empty()) {
     full_bricks_.push_back(0);
     tables_.resize(tables_.size() + bricks_of_block(), SEEN_BRICK_EMPTY);
+    is_changed_.resize(tables_.size(), false);
+    not_empty_.resize(words_for(tables_.size()), 0);
   } else {
     number = free_tables_.back();
     free_tables_.pop_back();
@@ -127,26 +102,31 @@ int SeenPoints::table(const BlockKey& block) {
 void SeenPoints::set_entry(int table, int brick, cl_int value) {
   const std::size_t place = at(table, brick);
   full_bricks_[table] += (value == SEEN_BRICK_FULL ? 1 : 0) - (tables_[place] == SEEN_BRICK_FULL ? 1 : 0);
+  const std::uint64_t bit = std::uint64_t{1} << place % 64;
+  std::uint64_t& word = not_empty_[place / 64];
+  word = value == SEEN_BRICK_EMPTY ? word & ~bit : word | bit;
   tables_[place] = value;
+  if (is_changed_[place]) return;
   changed_places_.push_back(static_cast<cl_int>(place));
+  is_changed_[place] = true;
 }
 
-/// Numbers of bricks that nothing else uses.
+/// The number of a brick that nothing else uses.
+cl_int SeenPoints::take_brick() {
+  if (free_.empty()) return static_cast<cl_int>(used_++);
+  const cl_int number = free_.back();
+  free_.pop_back();
+  return number;
+}
+
 std::vector<cl_int> SeenPoints::take_bricks(std::size_t count) {
-  std::vector<cl_int> numbers;
-  for (std::size_t n = 0; n < count; ++n) {
-    if (free_.empty()) {
-      numbers.push_back(static_cast<cl_int>(used_++));
-    } else {
-      numbers.push_back(free_.back());
-      free_.pop_back();
-    }
-  }
+  std::vector<cl_int> numbers(count);
+  for (cl_int& number : numbers) number = take_brick();
   return numbers;
 }
 
 cl_int SeenPoints::add_brick(int table, int brick) {
-  const cl_int number = take_bricks(1).front();
+  const cl_int number = take_brick();
   new_bricks_.push_back(number);
   set_entry(table, brick, number);
   return number;
@@ -195,13 +175,13 @@ void SeenPoints::send_entries(const char* stage) {
     new_bricks_.clear();
   }
   if (changed_places_.empty()) return;
-  std::sort(changed_places_.begin(), changed_places_.end());
-  changed_places_.erase(std::unique(changed_places_.begin(), changed_places_.end()), changed_places_.end());
   std::vector<cl_int2> entries;
+  entries.reserve(changed_places_.size());
   for (const cl_int place : changed_places_) entries.push_back({{place, tables_[place]}});
   const auto count = static_cast<cl_int>(entries.size());
   entries_.send(std::move(entries));
   commands_.run(stage, "set_seen_entries", count, kGroup, entries_(), count, tables_on_device_());
+  for (const cl_int place : changed_places_) is_changed_[place] = false;
   changed_places_.clear();
 }
 
@@ -265,123 +245,26 @@ std::vector<cl_uchar> SeenPoints::forget_points(const std::vector<PartlyForgotte
   return empty.read(ranges.size());
 }
 
-std::vector<BlockKey> SeenPoints::blocks() const {
-  std::vector<BlockKey> blocks;
-  for (const auto& [block, table] : table_of_.table()) blocks.push_back(block);
-  std::sort(blocks.begin(), blocks.end());
-  return blocks;
+/// Calls visitor(first brick, word) for the bits of not_empty_ that belong to a block, up to 64 in a word. Most words are 0.
+template <typename Visitor>
+void SeenPoints::for_each_word(int table, Visitor visitor) const {
+  const std::size_t first = at(table, 0);
+  if (bricks_of_block() < 64) return visitor(0, not_empty_[first / 64] >> first % 64 & ((std::uint64_t{1} << bricks_of_block()) - 1));
+  for (int brick = 0; brick < bricks_of_block(); brick += 64) visitor(brick, not_empty_[(first + brick) / 64]);
 }
 
-/// A block has up to 4096 bricks, most of them without points: these are passed over many at a time.
 std::vector<int> SeenPoints::bricks_with_points(int table) const {
-  constexpr int kMany = 64;
-  const cl_int* entries = &tables_[at(table, 0)];
   std::vector<int> bricks;
-  for (int first = 0; first < bricks_of_block(); first += kMany) {
-    const int end = std::min(first + kMany, bricks_of_block());
-    if (std::count(entries + first, entries + end, SEEN_BRICK_EMPTY) == end - first) continue;
-    for (int brick = first; brick < end; ++brick)
-      if (entries[brick] != SEEN_BRICK_EMPTY) bricks.push_back(brick);
-  }
+  for_each_word(table, [&](int first, std::uint64_t word) {
+    for_each_bit(word, [&](std::uint32_t bit) { bricks.push_back(first + static_cast<int>(bit)); });
+  });
   return bricks;
 }
 
-std::vector<BlockKey> SeenPoints::blocks_with_points() const {
-  std::vector<BlockKey> blocks;
-  for (const auto& [block, table] : table_of_.table()) {
-    const auto begin = tables_.begin() + at(table, 0);
-    if (std::any_of(begin, begin + bricks_of_block(), [](cl_int entry) { return entry != SEEN_BRICK_EMPTY; })) blocks.push_back(block);
-  }
-  std::sort(blocks.begin(), blocks.end());
-  return blocks;
-}
-
-std::vector<std::vector<std::uint8_t>> SeenPoints::read_blocks(const std::vector<BlockKey>& blocks) {
-  send_entries("changes");
-  const int bricks = bricks_of_block();
-  std::vector<std::vector<std::uint8_t>> stored(blocks.size());
-  std::vector<cl_int> mixed;
-  for (std::size_t n = 0; n < blocks.size(); ++n) {
-    const int* table = table_of_.find(blocks[n]);
-    if (table == nullptr) continue;
-    bool any = false;
-    for (int brick = 0; brick < bricks; ++brick) {
-      const cl_int number = entry(*table, brick);
-      any = any || number != SEEN_BRICK_EMPTY;
-      stored[n].push_back(number == SEEN_BRICK_EMPTY ? SEEN_NONE : number == SEEN_BRICK_FULL ? SEEN_ALL : SEEN_MIXED);
-      if (number > SEEN_BRICK_FULL) mixed.push_back(number);
-    }
-    if (!any) stored[n].clear();
-  }
-  if (mixed.empty()) return stored;
-  const std::size_t words = SEEN_WORDS * mixed.size();
-  const auto count = static_cast<cl_int>(mixed.size());
-  gathered_.resize(words);
-  gathered_list_.send(std::move(mixed));
-  commands_.run("changes", "gather_bricks", words, kGroup, gathered_list_(), count, bricks_(), gathered_());
-  const std::vector<cl_ulong> gathered = gathered_.read(words);
-  const auto* next = reinterpret_cast<const std::uint8_t*>(gathered.data());
-  for (std::vector<std::uint8_t>& bytes : stored) {
-    const std::size_t own = kBrickBytes * static_cast<std::size_t>(std::count(bytes.begin(), bytes.end(), SEEN_MIXED));
-    bytes.insert(bytes.end(), next, next + own);
-    next += own;
-  }
-  return stored;
-}
-
-void SeenPoints::add_blocks(const std::vector<SeenBlock>& blocks) {
-  const auto bricks = static_cast<std::size_t>(bricks_of_block());
-  std::vector<cl_ulong> words;
-  for (const auto& [block, bytes] : blocks) {
-    check_seen_block(bytes, bricks);
-    if (bytes.size() <= bricks) continue;
-    const std::size_t before = words.size();
-    words.resize(before + (bytes.size() - bricks) / sizeof(cl_ulong));
-    std::memcpy(&words[before], &bytes[bricks], bytes.size() - bricks);
-  }
-  send_entries("changes");
-  const std::vector<cl_int> numbers = take_bricks(words.size() / SEEN_WORDS);
-  try {
-    scatter(numbers, words);
-  } catch (...) {
-    give_back(numbers);
-    throw;
-  }
-  auto next = numbers.begin();  // nothing can fail from here on
-  for (const auto& [block, bytes] : blocks) {
-    drop_block(block);
-    if (bytes.empty()) continue;
-    const int own = table(block);
-    for (std::size_t brick = 0; brick < bricks; ++brick) {
-      if (bytes[brick] == SEEN_ALL) set_uniform(own, static_cast<int>(brick), true);
-      if (bytes[brick] == SEEN_MIXED) set_entry(own, static_cast<int>(brick), *next++);
-    }
-  }
-}
-
-/// Writes the words of bricks that no entry has yet.
-void SeenPoints::scatter(std::vector<cl_int> numbers, const std::vector<cl_ulong>& words) {
-  if (numbers.empty()) return;
-  const auto count = static_cast<cl_int>(numbers.size());
-  bricks_.grow(SEEN_WORDS * used_, bricks_.size());
-  gathered_.write(words);
-  gathered_list_.send(std::move(numbers));
-  commands_.run("changes", "scatter_bricks", words.size(), kGroup, gathered_list_(), count, gathered_(), bricks_());
-}
-
-/// The change of the tables waits for the next send_entries(): until then no table sent by open_window() has the block.
-void SeenPoints::drop_block(const BlockKey& block) {
-  const int* found = table_of_.find(block);
-  if (found == nullptr) return;
-  const int table = *found;
-  for (int brick = 0; brick < bricks_of_block(); ++brick) {
-    const cl_int number = entry(table, brick);
-    if (number == SEEN_BRICK_EMPTY) continue;
-    if (number > SEEN_BRICK_FULL) free_.push_back(number);
-    set_entry(table, brick, SEEN_BRICK_EMPTY);
-  }
-  free_tables_.push_back(table);
-  table_of_.erase(block);
+bool SeenPoints::has_points(int table) const {
+  std::uint64_t any = 0;
+  for_each_word(table, [&](int, std::uint64_t word) { any |= word; });
+  return any != 0;
 }
 
 std::size_t SeenPoints::bytes() const {

@@ -59,6 +59,7 @@ class SeenPoints {
   int table(const BlockKey& block);
   cl_int entry(int table, int brick) const { return tables_[at(table, brick)]; }
   std::vector<int> bricks_with_points(int table) const;  ///< those of a block of which any point is seen
+  bool has_points(int table) const;                      ///< is there one?
   int bricks_of_block() const { return 1 << (3 * shift_); }
   bool is_full(int table) const { return full_bricks_[table] == bricks_of_block(); }  ///< are all points of the block seen?
 
@@ -104,6 +105,9 @@ class SeenPoints {
   const cl::Buffer& brick_words() const { return bricks_(); }
 
  private:
+  static constexpr int kMostShift = 4;  ///< 16 bricks, hence 256 points, along a block's edge: a block's table takes 16 kB
+  static constexpr std::size_t kGroup = 64;
+
   std::size_t at(int table, int brick) const { return (static_cast<std::size_t>(table) << (3 * shift_)) + brick; }
   /// A brick of which some points are forgotten: first, and one past the last along each axis.
   struct PartlyForgotten {
@@ -114,10 +118,13 @@ class SeenPoints {
   };
   std::vector<PartlyForgotten> bricks_in(const Eigen::AlignedBox3d& box, std::vector<std::pair<int, int>>& whole) const;
   std::vector<cl_uchar> forget_points(const std::vector<PartlyForgotten>& partly);
+  cl_int take_brick();
   std::vector<cl_int> take_bricks(std::size_t count);
   void give_back(const std::vector<cl_int>& bricks) { free_.insert(free_.end(), bricks.rbegin(), bricks.rend()); }
   void scatter(std::vector<cl_int> numbers, const std::vector<cl_ulong>& words);
   void set_entry(int table, int brick, cl_int value);
+  template <typename Visitor>
+  void for_each_word(int table, Visitor visitor) const;
 
   Commands& commands_;
   const double block_size_;  ///< [m]
@@ -126,11 +133,13 @@ class SeenPoints {
   BlockMap<int> table_of_;
   std::vector<cl_int> tables_;                                ///< the device's tables; the host is their master
   std::vector<int> full_bricks_;                              ///< of each table: number of entries that are SEEN_BRICK_FULL
+  std::vector<std::uint64_t> not_empty_;                      ///< a bit for each entry: is it not SEEN_BRICK_EMPTY?
   std::vector<int> free_tables_;                              ///< of blocks that were dropped; the last one is used next
   std::vector<cl_int> free_;                                  ///< bricks that no entry has; the last one is used next
   std::size_t used_ = 2;                                      ///< one past the last brick ever used; the first two stand for uniform bricks
   std::size_t sent_tables_ = 0;                               ///< entries that the device has
-  std::vector<cl_int> changed_places_;                        ///< entries of the tables that the device does not have yet
+  std::vector<cl_int> changed_places_;                        ///< entries of the tables that the device does not have yet, each once
+  std::vector<bool> is_changed_;                              ///< of each entry: is it one of them?
   std::vector<cl_int> new_bricks_;                            ///< bricks that the device has not emptied yet
   std::shared_ptr<const std::vector<cl_int>> window_tables_;  ///< of each cell of the window that was opened last
   SentArray<cl_int> slots_;                                   ///< the same
