@@ -4,10 +4,20 @@
 #include <cmath>
 #include <utility>
 
+#include "frame/wide_vectors.hpp"
+
 namespace frontier_surfels {
 namespace {
 
 constexpr const char* kStage = "taking_back";
+
+/// Is any depth from the one to the other column, or that of a ray without a return, larger? Without a way out of the loop, so that the
+/// compiler makes vectors of it.
+WIDE_VECTORS bool any_beyond(const float* depth, int first, int last, float near) {
+  int any = 0;
+  for (int s = first; s <= last; ++s) any |= std::abs(depth[s]) > near ? 1 : 0;
+  return any != 0;
+}
 
 }  // namespace
 
@@ -90,7 +100,7 @@ std::size_t TakingBack::update(const Camera& camera, const MapWindow& window, co
     settle_bricks();
     taken_.open_window(window);
   }
-  frame->has_taken = bricks_with_points(window).empty() ? 0 : 1;
+  frame->has_taken = has_points(window) ? 1 : 0;
   frame->takes_back = pixels_ > 0 ? 1 : 0;
   return pixels_;
 }
@@ -128,6 +138,14 @@ std::vector<TakingBack::Brick> TakingBack::bricks_with_points(const MapWindow& w
                           cell / w.size_x / w.size_y * sides + brick / sides / sides, 0}}});
   }
   return bricks;
+}
+
+/// Has any block of the window taken points?
+bool TakingBack::has_points(const MapWindow& window) const {
+  if (taken_.empty()) return false;  // then no window was opened
+  for (int cell = 0; cell < window.cells(); ++cell)
+    if (const int table = taken_.window_table(cell); table != 0 && taken_.has_points(table)) return true;
+  return false;
 }
 
 /// Chooses the pixels whose surface takes space back, and counts them.
@@ -175,8 +193,7 @@ bool TakingBack::may_see(const WorkingImage& image, const Eigen::Vector3d& cente
   const auto [left, right] = range(center.x(), camera.fx, camera.cx, camera.width);
   const auto [top, bottom] = range(center.y(), camera.fy, camera.cy, camera.height);
   for (int t = top; t <= bottom; ++t)
-    for (int s = left; s <= right; ++s)
-      if (std::abs(image.depth[static_cast<std::size_t>(t) * camera.width + s]) > near) return true;
+    if (any_beyond(&image.depth[static_cast<std::size_t>(t) * camera.width], left, right, static_cast<float>(near))) return true;
   return false;
 }
 
@@ -184,20 +201,20 @@ bool TakingBack::may_see(const WorkingImage& image, const Eigen::Vector3d& cente
 std::vector<TakingBack::Place> TakingBack::places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
                                                          const std::vector<cl_uchar>& chosen) const {
   const Eigen::Isometry3d T_local_camera = window.T_camera_local().inverse();
+  const Eigen::Matrix3d R = T_local_camera.linear();
+  const Intrinsics& camera = image.intrinsics;
+  const Eigen::Array3d half_pixel = (R.col(0).cwiseAbs() / camera.fx + R.col(1).cwiseAbs() / camera.fy) / 2;  // at the depth 1
   const double brick_size = SEEN_BRICK * taken_.spacing();
   std::vector<Place> behind;
   Eigen::Array3i first_before(0, 0, 0), last_before(-1, -1, -1);
   for (auto next = std::find(chosen.begin(), chosen.end(), 1); next != chosen.end(); next = std::find(next + 1, chosen.end(), 1)) {
     const auto n = static_cast<std::size_t>(next - chosen.begin());
-    const double s = static_cast<double>(n % g.width) - image.intrinsics.cx, t = static_cast<double>(n / g.width) - image.intrinsics.cy;
+    const double s = static_cast<double>(n % g.width) - camera.cx, t = static_cast<double>(n / g.width) - camera.cy;
     const double near = image.depth[n], far = near + limits_.reach * std::max(near, static_cast<double>(g.z_min)) / g.f;
-    Eigen::AlignedBox3d box;  // around the part of the pixel's pyramid
-    for (const double z : {near, far})
-      for (const double x : {s - 0.5, s + 0.5})
-        for (const double y : {t - 0.5, t + 0.5})
-          box.extend(T_local_camera * Eigen::Vector3d(x / image.intrinsics.fx * z, y / image.intrinsics.fy * z, z));
-    const Eigen::Array3i first = (box.min() / brick_size).array().floor().cast<int>(),
-                         last = (box.max() / brick_size).array().floor().cast<int>();
+    const Eigen::Array3d ray = R * Eigen::Vector3d(s / camera.fx, t / camera.fy, 1), origin = T_local_camera.translation();
+    const Eigen::Array3d low = ray - half_pixel, high = ray + half_pixel;  // of a box around the pixel's pyramid, at the depth 1
+    const Eigen::Array3i first = ((origin + (near * low).min(far * low)) / brick_size).floor().cast<int>(),
+                         last = ((origin + (near * high).max(far * high)) / brick_size).floor().cast<int>();
     if ((first == first_before).all() && (last == last_before).all()) continue;  // neighbours mostly have the same places
     first_before = first;
     last_before = last;

@@ -93,6 +93,7 @@ class TakingBack {
   using Place = std::array<int, 3>;  ///< x, y, z, counted in bricks from the window's corner
 
   std::vector<Brick> bricks_with_points(const MapWindow& window) const;
+  bool has_points(const MapWindow& window) const;
   std::vector<Place> places_behind(const Grid& g, const MapWindow& window, const WorkingImage& image,
                                    const std::vector<cl_uchar>& chosen) const;
   bool may_see(const WorkingImage& image, const Eigen::Vector3d& center, double radius) const;
