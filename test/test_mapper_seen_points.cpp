@@ -49,6 +49,19 @@ TEST(MapperSeenPoints, AHoveringCameraLeavesNoWrongSurfels) {
   EXPECT_GT(s.right, 0.99) << text(s, surfels.size());
 }
 
+/// A frame is refused after the device was asked what the forgotten view sees.
+TEST(MapperSeenPoints, RefusedFramesDoNotDisturbWhatIsRemembered) {
+  Mapper mapper(few_views(2)), undisturbed(few_views(2));
+  for (const auto& frame : orbit_frames(coarse_camera(), 10, 5)) {
+    DepthFrame refused = frame.view();
+    refused.depth.data = nullptr;
+    EXPECT_THROW(mapper.integrate(refused), BadFrame);
+    mapper.integrate(frame.view());
+    undisturbed.integrate(frame.view());
+  }
+  EXPECT_TRUE(same_memory(mapper.saved_map(), undisturbed.saved_map()));
+}
+
 TEST(MapperSeenPoints, AStillCameraFillsNothing) {
   const Frames frames = orbit_frames(coarse_camera(), 1);
   Mapper mapper(few_views(3));

@@ -117,6 +117,7 @@ void Mapper::Impl::begin_map(const std::vector<Surfel>& surfels, const SeenSpace
   map.set_lost(true);  // until all that belongs to it is there
   views.clear(map.size() == 0);
   seen.clear();
+  remembering.clear();
   taking_back.clear();
   pose_correction.clear();
   if (config.seen_points) seen.load(has_seen);

@@ -96,6 +96,7 @@ struct Mapper::Impl {
 
   void begin_call();
   void remember_forgotten();
+  void note_changed(const std::vector<BlockKey>& blocks);
   Report integrate(const DepthFrame& input);
   Report update(const DepthFrame& input);
   std::uint64_t stage_times_every() const;

@@ -20,11 +20,12 @@ void Mapper::Impl::begin_call() {
   map.roll_back();
 }
 
-/// What the last frame has forgotten is remembered by the next call that needs it, before anything else. If that fails, the frame that
-/// forgot it is in the map all the same, and the call after that goes on with it.
-void Mapper::Impl::remember_forgotten() {
-  const std::vector<BlockKey> changed = remembering.remember_forgotten(views, map.block_size(), seen);
-  if (archive) archive->note_changed(changed);
+/// What the last frame has forgotten is remembered by the next call that needs it, before anything else; the next frame does it in steps.
+/// If that fails, the frame that forgot it is in the map all the same, and the call after that goes on with it.
+void Mapper::Impl::remember_forgotten() { note_changed(remembering.remember_forgotten(views, map.block_size(), seen)); }
+
+void Mapper::Impl::note_changed(const std::vector<BlockKey>& blocks) {
+  if (archive) archive->note_changed(blocks);
 }
 
 /// All or nothing.
@@ -49,6 +50,11 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   report.sequence = sequence + 1;
   const auto number = static_cast<std::uint32_t>(report.sequence);
   commands.time_stages(report.sequence % stage_times_every() == 0);
+  begin_call();
+
+  // What the last frame has forgotten is remembered - ours. The device looks for it while the host makes the image
+  remembering.ask(views, map.block_size(), seen);
+  commands.start();
 
   // The working image, and the non-uniform voxel grid of its camera - 3.1, eq. (2)-(3)
   const auto shared_image = std::make_shared<const WorkingImage>(make_working_image(input, config, cameras.max_voxels(), sampling_room));
@@ -56,12 +62,13 @@ Report Mapper::Impl::update(const DepthFrame& input) {
   report.measured_pixels = image.measured_pixels();
   Camera& camera = cameras.find(image.intrinsics);
 
-  begin_call();
-  remember_forgotten();
+  remembering.take_answer();
 
   // Observed space C~ - 3.3, eq. (9)-(11). It needs no pose: the device finds it while the host corrects the pose
   camera.set_image(shared_image);
   observed.compute(camera);
+  commands.start();
+  note_changed(remembering.see(views, seen));
   commands.start();
 
   // Pose correction - ours: the jitter of the recorded poses is taken out
@@ -93,7 +100,11 @@ std::uint64_t Mapper::Impl::stage_times_every() const {
 
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.maps(), sequence);
-  if (archive) fetch_blocks(camera, T_world_camera, number);
+  if (archive) {
+    commands.wait();
+    remembering.settle(seen);
+    fetch_blocks(camera, T_world_camera, number);
+  }
   map.open_window(camera.grid(), T_world_camera);
   views.set_current(image, T_world_camera);
   seen.choose_spacing(seen_spacing(camera));
@@ -211,6 +222,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
                                 Report& report) {
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
   if (stage_times_every() > 1) commands.time_stages(false);
+  remembering.settle(seen);
   taking_back.add_to_last_frames(camera, image, pose.T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
   pose_correction.add(image, pose);
@@ -219,10 +231,8 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
   looked_at.note(blocks_in_view, sequence);
   taken_from.note(taking_back.take_changed(), sequence);
   lost_page.note(shrunk, sequence);
-  if (archive) {
-    archive->note_changed(shrunk);
-    archive->save_some(number);
-  }
+  note_changed(shrunk);
+  if (archive) archive->save_some(number);
   report.surfels = map.size();
   report.map_bytes = map.bytes();
   report.seen_bytes = seen.bytes();
