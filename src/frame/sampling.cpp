@@ -73,6 +73,17 @@ void count_columns(const std::array<const float*, kColumns>& depth, int width, c
   }
 }
 
+WIDE_VECTORS void interpret(const DepthMeaning meaning, const std::vector<float>& means, std::vector<float>& depth) {
+  for (std::size_t n = 0; n < means.size(); ++n) depth[n] = meaning(means[n]);
+}
+
+/// Is any value not farther than `reach` from `middle`?
+WIDE_VECTORS bool any_near(const float* values, int count, float middle, float reach) {
+  int any = 0;
+  for (int n = 0; n < count; ++n) any |= std::abs(values[n] - middle) <= reach ? 1 : 0;
+  return any != 0;
+}
+
 }  // namespace
 
 DepthRows::DepthRows(const DepthImage& image, const Config& config, int margin)
@@ -250,8 +261,9 @@ std::vector<float> Sampling::in_range(const std::vector<float>& means, int width
   const float z_max = static_cast<float>(config_.z_max), near_limit = tolerance(z_max), beyond = std::nextafter(z_max, 2 * z_max);
   const DepthMeaning meaning(config_);
   std::vector<float> depth(means.size());
-  std::transform(means.begin(), means.end(), depth.begin(), meaning);
-  for (int t = 0; t < height; ++t)
+  interpret(meaning, means, depth);
+  for (int t = 0; t < height; ++t) {
+    if (!any_near(&means[static_cast<std::size_t>(t) * width], width, z_max, near_limit)) continue;
     for (int s = 0; s < width; ++s) {
       const std::size_t n = static_cast<std::size_t>(t) * width + s;
       const float mean = means[n];
@@ -266,6 +278,7 @@ std::vector<float> Sampling::in_range(const std::vector<float>& means, int width
         }
       depth[n] = meaning(sum / count > z_max ? beyond : std::min(mean, z_max));
     }
+  }
   return depth;
 }
 

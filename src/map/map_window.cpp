@@ -77,6 +77,8 @@ MapWindow::MapWindow(const Grid& grid, const Eigen::Isometry3d& T_world_camera, 
   window_.size_z = static_cast<int>(size.z());
   window_.block_size = static_cast<float>(block_size);
   T_camera_local_ = T_world_camera.inverse() * Eigen::Translation3d(low * block_size);
+  for (int n = 0; n < 8; ++n)
+    to_corners_.row(n) = (T_camera_local_.linear() * (window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
 }
 
 MapWindow::MapWindow(const BlockKey& first, const BlockKey& last, double block_size)
@@ -97,9 +99,8 @@ Eigen::Vector3d MapWindow::corner(const BlockKey& block) const {
 }
 
 bool MapWindow::meets_grid(const BlockKey& block) const {
-  Eigen::Array<double, 8, 3> p;  // the block's corners, camera frame
-  for (int n = 0; n < 8; ++n)
-    p.row(n) = (T_camera_local_ * (corner(block) + window_.block_size * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2))).array();
+  const Eigen::Vector3d lowest = T_camera_local_ * corner(block);
+  const Eigen::Array<double, 8, 3> p = to_corners_.rowwise() + lowest.array().transpose();  // the block's corners, camera frame
   const auto x = p.col(0), y = p.col(1), z = p.col(2);
   const double voxel_low = std::max<double>(z.minCoeff(), grid_.z_min) / grid_.f;
   constexpr double kRadiusRounding = 1.001;       // stored radii have 11 bits

@@ -47,6 +47,8 @@ class MapWindow {
   Grid grid_ = {};
   Window window_ = {};
   Eigen::Isometry3d T_camera_local_ = Eigen::Isometry3d::Identity();  ///< identity only while the window is empty
+  Eigen::Array<double, 8, 3> to_corners_ =
+      Eigen::Array<double, 8, 3>::Zero();  ///< from a block's lowest corner to all of them, camera frame [m]
   SurfelExtent extent_;
   double z_far_ = 0;  ///< depth at which the grid ends [m]
 };
