@@ -101,8 +101,8 @@ std::uint64_t Mapper::Impl::stage_times_every() const {
 Frame Mapper::Impl::begin_frame(const WorkingImage& image, const Eigen::Isometry3d& T_world_camera, Camera& camera, std::uint32_t number) {
   if (readers.forget_lost_ones(sequence)) map.reserve_ids(readers.maps(), sequence);
   if (archive) {
-    commands.wait();
-    remembering.settle(seen);
+    if (remembering.must_settle()) commands.wait();
+    remembering.settle(seen);  // before blocks move
     fetch_blocks(camera, T_world_camera, number);
   }
   map.open_window(camera.grid(), T_world_camera);
@@ -222,7 +222,7 @@ void Mapper::Impl::finish_frame(std::uint32_t number, const WorkingImage& image,
                                 Report& report) {
   report.stages = commands.take_times();  // waits for the device: whatever has failed shows by now
   if (stage_times_every() > 1) commands.time_stages(false);
-  remembering.settle(seen);
+  remembering.settle(seen);  // the host has waited
   taking_back.add_to_last_frames(camera, image, pose.T_world_camera, views.current_number());
   const std::vector<BlockKey> shrunk = map.commit(number);
   pose_correction.add(image, pose);

@@ -33,6 +33,7 @@ class Remembering {
   /// Bricks of which all points are seen, or none, give their words back. To be called once the host has waited for the device, before
   /// anything else changes the seen points. If the frame fails before, the next ask() or remember_forgotten() does it.
   void settle(SeenPoints& seen);
+  bool must_settle() const { return !seen_bricks_.empty(); }
   /// @}
 
   void clear() { seen_bricks_.clear(); }  ///< forgets the view that is being remembered, as the seen points do
