@@ -1,6 +1,7 @@
 /// Maps whose views have been forgotten: nothing is lost but a little sharpness, and saved maps go on as if nothing had happened.
 #include "frontier_surfels/map_file.hpp"
 #include "mapper_archive_input.hpp"
+#include "opencl/fault_injection.hpp"
 
 namespace frontier_surfels {
 namespace {
@@ -56,6 +57,9 @@ TEST(MapperSeenPoints, RefusedFramesDoNotDisturbWhatIsRemembered) {
     DepthFrame refused = frame.view();
     refused.depth.data = nullptr;
     EXPECT_THROW(mapper.integrate(refused), BadFrame);
+    FaultInjection::stop();
+    EXPECT_THROW(mapper.integrate(refused), BadFrame);
+    EXPECT_EQ(FaultInjection::count(), 0U);  // the device is not asked again
     mapper.integrate(frame.view());
     undisturbed.integrate(frame.view());
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "map/seen_block.hpp"
+#include "opencl/fault_injection.hpp"
 #include "stages/frame_fixture.hpp"
 #include "stages/reference_views.hpp"
 #include "stages/remembering.hpp"
@@ -142,6 +143,34 @@ TEST_F(SeenPointsTest, TheSameViewAgainChangesNothing) {
   EXPECT_EQ(fixture_->seen().bytes(), bytes);
   ASSERT_EQ(after.blocks.size(), before.blocks.size());
   for (std::size_t n = 0; n < before.blocks.size(); ++n) EXPECT_EQ(after.blocks[n].bytes, before.blocks[n].bytes);
+}
+
+/// Whatever fails: whoever saves the changed blocks must hear of all of them.
+TEST_F(SeenPointsTest, AfterAFailureTheSameBlocksHaveChanged) {
+  remember(make_camera(40, 40, 25, 25, 80), 1, 0.02, Content::mixed, true);
+  SeenPoints& seen = fixture_->seen();
+  const auto again = [&] {
+    return remembering_->remember(*fixture_->views().forgotten(), fixture_->views(), fixture_->map().block_size(), seen);
+  };
+  seen.clear();
+  const std::vector<BlockKey> expected = again();
+  EXPECT_TRUE(std::any_of(expected.begin(), expected.end(), [&](const BlockKey& block) { return seen.is_full(seen.table(block)); }));
+  bool failed = true;
+  for (std::size_t n = 0; failed && !HasFailure(); ++n) {
+    SCOPED_TRACE("call " + std::to_string(n));
+    seen.clear();
+    FaultInjection::fail(n, 1);
+    try {
+      again();
+      failed = false;
+    } catch (const cl::Error&) {
+    }
+    FaultInjection::stop();
+    EXPECT_TRUE(failed || n > 5);
+    if (failed) {
+      EXPECT_EQ(again(), expected);
+    }
+  }
 }
 
 TEST_F(SeenPointsTest, SavedAndLoadedPointsAreTheSame) {

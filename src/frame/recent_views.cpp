@@ -191,12 +191,13 @@ std::string RecentViews::excess(std::size_t size) const {
          " billion pixels, more than 2 billion; ";
 }
 
-/// Makes every room larger; the kept images are copied.
+/// Makes every room larger; the kept images are copied, and that of a forgotten view.
 void RecentViews::enlarge_rooms(std::size_t size) {
   const std::size_t rooms = config_.recent_views + 1;
   if (const std::string fault = excess(size); !fault.empty()) throw BadFrame(fault + "raise decimation or lower recent_views.");
   std::size_t used = 0;
   for (const Kept& kept : kept_) used = std::max(used, kept.room + 1);
+  if (forgotten_) used = std::max(used, forgotten_->room + 1);
   depths_.widen_rows(rooms, used, room_size_, size);
   room_size_ = size;
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kStage = "remembering";
 
-/// Calls visitor(index) for each value that is not 0. Most are: they are passed over eight at a time.
+/// Calls visitor(index) for each value that is not 0. Most are 0, and are passed over eight at a time.
 template <typename Visitor>
 void for_each_not_0(const std::vector<cl_uchar>& values, Visitor visitor) {
   std::uint64_t some = 0;
@@ -37,6 +37,7 @@ std::vector<BlockKey> Remembering::remember(const ForgottenView& view, const Rec
   take_answer();
   std::vector<BlockKey> changed = set_points(views, seen);
   commands_.wait();
+  set_whole(seen);
   settle(seen);
   return changed;
 }
@@ -51,23 +52,36 @@ std::vector<BlockKey> Remembering::remember_forgotten(RecentViews& views, double
 
 void Remembering::ask(const RecentViews& views, double block_size, SeenPoints& seen) {
   make_up(views, seen);
+  if (is_asked_) return;
   asked_ = {};
-  if (views.forgotten()) find_bricks(*views.forgotten(), views, block_size, seen);
+  if (!views.forgotten()) return;
+  find_bricks(*views.forgotten(), views, block_size, seen);
+  is_asked_ = true;
 }
 
-void Remembering::take_answer() { found_now_ = found_.read(asked_.bricks); }
+void Remembering::take_answer() {
+  is_asked_ = false;
+  found_now_ = found_.read(asked_.bricks);
+}
 
 std::vector<BlockKey> Remembering::see(RecentViews& views, SeenPoints& seen) {
   if (!views.forgotten()) return {};
   std::vector<BlockKey> changed = set_points(views, seen);
+  set_whole(seen);
   views.dismiss_forgotten();
   return changed;
+}
+
+void Remembering::clear() {
+  is_asked_ = false;
+  seen_bricks_.clear();
 }
 
 /// What the view adds to each brick of the blocks around it.
 void Remembering::find_bricks(const ForgottenView& view, const RecentViews& views, double block_size, SeenPoints& seen) {
   const ViewBlocks around = blocks_of_view(view.intrinsics, view.T_world_camera, view.deepest, block_size);
   asked_ = {views.view_of(view, around.T_camera_local), around.window, {}, 0};
+  is_asked_ = false;
   for (const BlockKey& key : around.blocks) {
     const int table = seen.table(key);
     if (seen.is_full(table)) continue;
@@ -87,14 +101,15 @@ void Remembering::find_bricks(const ForgottenView& view, const RecentViews& view
 std::vector<BlockKey> Remembering::set_points(const RecentViews& views, SeenPoints& seen) {
   const int shift = seen.shift(), sides = (1 << shift) - 1;
   std::vector<cl_int4> seen_by;
-  std::vector<Brick> whole, mixed;
+  std::vector<Brick> mixed;
   std::vector<BlockKey> changed;
+  whole_.clear();
   for_each_not_0(found_now_, [&](std::size_t n) {
     const cl_int4& block = asked_.blocks[n >> 3 * shift];
     const BlockKey key = {asked_.window.origin_x + block.s[0], asked_.window.origin_y + block.s[1], asked_.window.origin_z + block.s[2]};
     if (changed.empty() || changed.back() != key) changed.push_back(key);
     const Brick brick = {block.s[3], static_cast<int>(n & ((std::size_t{1} << 3 * shift) - 1))};
-    if (found_now_[n] == SEEN_ALL) return whole.push_back(brick);
+    if (found_now_[n] == SEEN_ALL) return whole_.push_back(brick);
     const cl_int before = seen.entry(brick.table, brick.number);
     const cl_int words = before == SEEN_BRICK_EMPTY ? seen.add_brick(brick.table, brick.number) : before;
     seen_by.push_back({{(block.s[0] << shift) + (brick.number & sides), (block.s[1] << shift) + (brick.number >> shift & sides),
@@ -103,8 +118,12 @@ std::vector<BlockKey> Remembering::set_points(const RecentViews& views, SeenPoin
   });
   see_points(views, std::move(seen_by), seen);
   seen_bricks_ = std::move(mixed);
-  for (const Brick& brick : whole) seen.set_uniform(brick.table, brick.number, true);
+  found_now_ = {};
   return changed;
+}
+
+void Remembering::set_whole(SeenPoints& seen) {
+  for (const Brick& brick : whole_) seen.set_uniform(brick.table, brick.number, true);
 }
 
 void Remembering::see_points(const RecentViews& views, std::vector<cl_int4> seen_by, SeenPoints& seen) {
@@ -124,8 +143,8 @@ void Remembering::find_states(cl_int count, const SeenPoints& seen) {
   states_now_ = states_.read_later(count);
 }
 
-/// Ends what a frame that failed has begun. Nobody knows whether the states were read. A view that is to be remembered once more finds its
-/// bricks again, and must find all of them.
+/// Ends what a frame that failed has begun: nobody knows whether the states were read. If the view is still to be remembered, the bricks
+/// stay as they are: uniform ones would not be found again, nor their blocks returned.
 void Remembering::make_up(const RecentViews& views, SeenPoints& seen) {
   if (views.forgotten()) seen_bricks_.clear();
   if (seen_bricks_.empty()) return;
